@@ -313,3 +313,42 @@ MEASURES = {"eye_separation": 57.8, "eye_nose": 48.2, "mouth_nose": 18.8, "mouth
 SCALES = {"upper": ("eye_separation", "eye_nose", "eye_nose"), "middle": ("eye_separation", "eye_nose", "eye_nose"),
           "lid": ("eye_separation", "eye_opening", "eye_opening"),
           "mouth": ("mouth_width", "mouth_nose", "mouth_width")}
+LID_FOLLOW = [0.022, -0.011]         # travel per degree of looking down: the upper lid goes along, the lower gives way
+HEAD = {"pivot": [0.0, -70.0, -75.0], "moves_above": [0.0, -84.0, -70.0], "rests_below": [0.0, -138.0, -80.0]}
+HEAD_HALF_HEIGHT = 107.0             # crown to chin is two units of the 1986 paper
+PARTS = [
+    {"file": "parts.obj", "part": "eye_L", "carried_by": "eye", "eye": "L"},
+    {"file": "parts.obj", "part": "eye_R", "carried_by": "eye", "eye": "R"},
+    {"file": "parts.obj", "part": "teeth_upper", "carried_by": "skull"},
+    {"file": "parts.obj", "part": "teeth_lower", "carried_by": "jaw"},
+    {"file": "parts.obj", "part": "tongue", "carried_by": "jaw"},
+    {"file": "soft.obj", "part": "mouth", "carried_by": "mouth", "fades": [-52.0, -80.0]},
+    {"file": "soft.obj", "part": "brows", "carried_by": "skin"},
+    {"file": "soft.obj", "part": "hair", "carried_by": "skin"},
+]
+
+# Corrective folds: the valley's curve, half width, depth, ridge height (mm), the side the ridge lies on.
+FOLDS = {
+    "nasolabial_L": {"along": [[17.5, -36.0, 22.0], [21.5, -44.0, 21.0], [26.5, -53.0, 19.0], [31.0, -62.0, 16.5],
+                               [33.5, -71.0, 14.0]], "width": 2.4, "depth": 1.5, "ridge": 1.5, "toward": [1, 0.6, 0]},
+    "crows_feet_L": {"along": [[46.5, -2.0, 7.0], [51.0, -3.5, 2.0], [55.5, -6.5, -4.0]], "width": 1.1, "depth": 0.7,
+                     "ridge": 0.35, "toward": [0, -1, 0]},
+    "under_eye_L": {"along": [[16.0, -9.0, 14.0], [23.0, -13.0, 15.5], [31.0, -14.0, 15.0], [40.0, -11.5, 11.5],
+                              [46.0, -7.0, 7.5]], "width": 1.9, "depth": 0.9, "ridge": 0.8, "toward": [0, 1, 0]},
+    "forehead_low_L": {"along": [[-3.0, 30.0, 25.5], [10.0, 31.0, 25.0], [24.0, 33.0, 22.0], [40.0, 33.0, 14.0]],
+                       "width": 2.0, "depth": 0.8, "ridge": 0.6, "toward": [0, 1, 0]},
+    "forehead_high_L": {"along": [[-3.0, 40.0, 23.5], [10.0, 41.0, 23.0], [24.0, 42.5, 20.0], [38.0, 42.0, 13.0]],
+                        "width": 2.0, "depth": 0.8, "ridge": 0.6, "toward": [0, 1, 0]},
+    "frown_L": {"along": [[4.6, 7.0, 24.5], [5.4, 14.0, 26.0], [5.0, 23.0, 26.0]], "width": 1.5, "depth": 1.1,
+                "ridge": 0.8, "toward": [1, 0, 0]},
+    "nose_root": {"along": [[-8.0, 2.5, 20.0], [0.0, 3.5, 23.5], [8.0, 2.5, 20.0]], "width": 1.6, "depth": 1.0,
+                  "ridge": 0.7, "toward": [0, 1, 0]},
+    "chin": {"along": [[-13.0, -84.0, 20.5], [0.0, -82.5, 24.5], [13.0, -84.0, 20.5]], "width": 2.6, "depth": 1.3,
+             "ridge": 1.1, "toward": [0, -1, 0]},
+}
+
+
+def mirrored_fold(fold: dict) -> dict:
+    """Return a fold on the other side."""
+    flip = lambda v: [-v[0], *v[1:]]  # noqa: E731
+    return {**fold, "along": [flip(v) for v in fold["along"]], "toward": flip(fold["toward"])}

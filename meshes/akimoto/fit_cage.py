@@ -457,9 +457,10 @@ def write(names, vertices, faces, materials, creases, corners) -> None:
             points[full_name] = {"vertex": at[side(where, s)], "role": role, "scale": scale,
                                  **({"jaw": jaw} if jaw else {}), **({"paper": number} if number else {})}
             place[full_name] = vertices[at[side(where, s)]]
+    points["tongue_tip"] = {"at": [0.0, -69.9, 10.6], "part": "tongue", "role": "input", "scale": "mouth"}
     points = dict(sorted(points.items(), key=lambda kv: (kv[0][-2:] in ("_L", "_R"), kv[0][-2:] == "_R")))
 
-    left = [n for n in points if not n.endswith("_R")]
+    left = [n for n in points if not n.endswith("_R") and n in place]
     xyz = np.array([place[n] for n in left])
     nudge = {"lip_upper": 0.6, "lip_lower": -0.6}
     for i, n in enumerate(left):      # the lips touch: part them for the layout only
@@ -512,7 +513,8 @@ def write(names, vertices, faces, materials, creases, corners) -> None:
                 movers.append([at[f"{ring}_{i}_{s}"], col, "lower" if lower else "upper", part])
         lids[s] = {"columns": [[at[f"lid_margin_{a}_{s}"], at[f"lid_margin_{b}_{s}"]]
                                for a, b in ((1, 9), (2, 8), (3, 7), (4, 6))],
-                   "movers": movers}
+                   "movers": movers, "rims": [at[f"lid_rim_{i}_{s}"] for i in range(10)],
+                   "skin": [at[f"lid_crease_{i}_{s}"] for i in range(10)]}
     eye = design.EYE_CENTRE.tolist()
     data = {
         "name": "akimoto", "source": "own work of the facegen authors, MIT; written by meshes/akimoto/fit_cage.py",
@@ -520,20 +522,23 @@ def write(names, vertices, faces, materials, creases, corners) -> None:
         "scales": {k: list(v) for k, v in design.SCALES.items()}, "points": points, "regions": regions,
         "sheets": sheets, "followers": follow, "creases": creases.tolist(), "corners": corners.tolist(),
         "jaw": {"rule": "vertices", "hinge": list(design.JAW_HINGE), "glide": list(design.JAW_GLIDE)},
-        "eyes": {"L": eye, "R": [-eye[0], *eye[1:]]}, "lids": lids,
+        "eyes": {"L": eye, "R": [-eye[0], *eye[1:]]}, "lids": lids, "lid_follow": design.LID_FOLLOW,
+        "head": design.HEAD, "head_half_height": design.HEAD_HALF_HEIGHT, "parts": design.PARTS,
+        "folds": {(n[:-1] + s if n.endswith("_L") else n): (v if s == "L" else design.mirrored_fold(v))
+                  for n, v in design.FOLDS.items() for s in ("LR" if n.endswith("_L") else "L")},
     }
     (HERE / "cage_names.txt").write_text("\n".join(names) + "\n")
     lines = ["# The base face: feature points, regions and rotations. Millimetres, +x subject's left, +y up, +z forward.",
              "# Vertices are 0-based indices into cage.obj. Written by fit_cage.py; see docs/face.md for the keys."]
     dump = lambda v: yaml.safe_dump(v, default_flow_style=True, width=10**6, sort_keys=False).strip()  # noqa: E731
     for key, value in data.items():
-        if key in ("points", "measures", "scales", "jaw", "eyes"):
+        if key in ("points", "measures", "scales", "jaw", "eyes", "head", "folds"):
             lines += [f"{key}:"] + [f"  {k}: {dump(v).removesuffix('...').strip()}" for k, v in value.items()]
-        elif key == "regions":
-            lines += ["regions:"] + [f"- {dump(r)}" for r in value]
+        elif key in ("regions", "parts"):
+            lines += [f"{key}:"] + [f"- {dump(r)}" for r in value]
         elif key == "lids":
             lines += ["lids:"] + [line for s, v in value.items() for line in (
-                f"  {s}:", f"    columns: {dump(v['columns'])}", f"    movers: {dump(v['movers'])}")]
+                f"  {s}:", *(f"    {k}: {dump(x)}" for k, x in v.items()))]
         else:
             lines.append(f"{key}: {dump(value).removesuffix('...').strip()}")
     (HERE / "face.yaml").write_text("\n".join(lines) + "\n")

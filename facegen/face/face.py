@@ -1,0 +1,284 @@
+"""A face: a cage with feature points and regions, its smooth surface, and the parts that ride on it.
+
+``face.yaml`` beside a cage holds all data of a face (docs/face.md explains the keys), so that another face needs
+no code. A face is a rig: ``pose(what)`` gives vertices, ``mesh(detail)`` what they belong to.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cache, cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from facegen.data import meshes_dir
+from facegen.errors import InputError, nearest
+from facegen.face.attach import Attachment, attach
+from facegen.face.deformer import Array, Deformer
+from facegen.face.eye import eyeball_radius
+from facegen.face.folds import fold_field
+from facegen.face.loader import FaceData, read_face
+from facegen.facs.deformation import Deformation
+from facegen.facs.expressions import Resolution, resolve
+from facegen.geometry.mesh import Mesh, merge
+from facegen.geometry.normals import vertex_normals
+from facegen.geometry.subdivision import loop_once
+
+MAX_DETAIL = 3
+"""Finest subdivision level; every level samples the surface of this one."""
+
+LID_THICKNESS = 0.3
+"""Millimetres of skin between a lid's surface and the eyeball, at least."""
+
+
+@dataclass(frozen=True, eq=False)
+class Controls:
+    """What drives the deformer, in millimetres and degrees, batched over leading axes.
+
+    ``vectors`` (..., k, 3); ``jaw`` (..., 3): open, side, forward; ``lids`` (..., 4): upper and lower travel,
+    left then right eye; ``eyes`` (..., 4): yaw and pitch, left then right; ``head`` (..., 4): yaw, pitch, roll,
+    forward; ``folds`` (..., f).
+    """
+
+    vectors: Array
+    jaw: Array
+    lids: Array
+    eyes: Array
+    head: Array
+    folds: Array
+
+
+@dataclass(frozen=True, eq=False)
+class _Level:
+    """What is constant at one level of detail."""
+
+    matrix: sparse.csr_array            # surface vertices from cage vertices
+    mesh: Mesh                          # neutral, all parts
+    lid_vertices: tuple[NDArray[np.int64], ...]
+    folds: Array                        # (f, n_surface, 3) displacement at amount one
+    head_weight: Array                  # (n, 1)
+
+
+class Face:
+    """A parametric face; load one with :func:`load_face`."""
+
+    def __init__(self, data: FaceData) -> None:
+        self._data = data
+        self.name = data.name
+        self.deformer: Deformer = data.deformer
+        self._levels: dict[int, _Level] = {}
+
+    # -- what there is ------------------------------------------------------------------------------------------
+    @property
+    def feature_points(self) -> dict[str, Array]:
+        """Name -> neutral place (3,), mm, of every feature point."""
+        return dict(zip(self._data.point_names, self.deformer.points, strict=True))
+
+    @property
+    def regions(self) -> tuple[tuple[str, str, str], ...]:
+        """The three feature points that bound each region."""
+        names = self._data.point_names
+        return tuple((names[a], names[b], names[c]) for a, b, c in (r.points for r in self._data.regions))
+
+    @property
+    def fold_names(self) -> tuple[str, ...]:
+        """Names of the corrective folds."""
+        return tuple(self._data.folds)
+
+    def mesh(self, detail: int = 2) -> Mesh:
+        """Return the neutral face at a subdivision level, 0 (the cage's own triangles) to 3."""
+        return self._level(detail).mesh
+
+    # -- poses --------------------------------------------------------------------------------------------------
+    def pose(self, what: Any = "neutral", *, person: Any = None, intensity: float = 1.0, detail: int = 2) -> Array:
+        """Return the vertices (n, 3), mm, of ``mesh(detail)`` under an expression.
+
+        ``what``: an expression's name, an AU script (``"6C+12D"``), a mapping of unit codes to weights 0-1, a
+        :class:`Deformation`, or the path of a deformation file. ``person``: whose table overrides the common
+        one, by name or path. ``intensity`` scales the expression. InputError says what cannot be understood.
+        """
+        return self.pose_controls(self.controls(self.resolve(what, person=person, intensity=intensity).deformation),
+                                  detail=detail)
+
+    def resolve(self, what: Any, *, person: Any = None, intensity: float = 1.0) -> Resolution:
+        """Return the chain name -> units -> deformation data (Akimoto 1986, fig. 10)."""
+        return resolve(what, person=person, intensity=intensity)
+
+    def controls(self, deformation: Deformation) -> Controls:
+        """Return the deformer's input, mm and degrees, for deformation data in its own units."""
+        d = self._data
+        units = deformation.units
+        if units == "face":
+            scale, mouth = d.point_scale, d.scales["mouth"]
+        elif units == "millimetre":
+            scale, mouth = np.ones((len(d.point_names), 3)), np.ones(3)
+        else:                                              # the paper's: half head heights, z backward
+            scale = np.tile(d.head_half_height * np.array([1.0, 1.0, -1.0]), (len(d.point_names), 1))
+            mouth = scale[0]
+        vectors = np.zeros((len(d.point_names), 3))
+        for name, vector in deformation.points.items():
+            row = d.point_index.get(name)
+            if row is None:
+                if name in d.optional_points and units == "face":
+                    continue
+                raise InputError(f"points: {name!r} is no feature point of the face {self.name!r}"
+                                 f"{nearest(name, d.point_index)}")
+            vectors[row] += np.asarray(vector, float) * scale[row]
+        jaw = deformation.jaw
+        jaw_state = np.array([jaw.get("open", 0.0), jaw.get("side", 0.0) * mouth[0], jaw.get("forward", 0.0) * mouth[2]])
+        for name in deformation.with_jaw:
+            row = d.point_index.get(name)
+            if row is None:
+                raise InputError(f"with_jaw: {name!r} is no feature point of the face {self.name!r}"
+                                 f"{nearest(name, d.point_index)}")
+            if not self.deformer.jaw_share[row]:
+                vectors[row] += self.deformer.jaw.movement(self.deformer.points[[row]], jaw_state)[0]
+        eyes = np.array([deformation.eyes.get(k, 0.0) for k in ("yaw_L", "pitch_L", "yaw_R", "pitch_R")])
+        lids = np.array([deformation.lids.get(k, 0.0) for k in ("upper_L", "lower_L", "upper_R", "lower_R")])
+        lids = lids + (d.lid_follow * -eyes[[1, 1, 3, 3]])
+        head = np.array([*(deformation.head.get(k, 0.0) for k in ("yaw", "pitch", "roll")),
+                         deformation.head.get("forward", 0.0) * mouth[2] * (1 if units != "paper" else 1)])
+        for name in deformation.folds:
+            if name not in d.folds and not d.optional_points:
+                raise InputError(f"folds: {name!r} is no fold of the face {self.name!r}{nearest(name, d.folds)}")
+        folds = np.array([deformation.folds.get(k, 0.0) for k in d.folds])
+        return Controls(vectors, jaw_state, lids, eyes, head, folds)
+
+    def pose_controls(self, controls: Controls, *, detail: int = 2) -> Array:
+        """Return vertices (..., n, 3), mm, of ``mesh(detail)`` for (a batch of) controls."""
+        d, level = self._data, self._level(detail)
+        cage = self.deformer.deform(controls.vectors, controls.jaw, controls.lids)
+        if not (np.any(controls.vectors) or np.any(controls.jaw) or np.any(controls.lids) or np.any(controls.eyes)
+                or np.any(controls.head) or np.any(controls.folds)):
+            return np.broadcast_to(level.mesh.vertices, (*cage.shape[:-2], *level.mesh.vertices.shape)).copy()
+        batch = cage.shape[:-2]
+        flat = np.moveaxis(cage.reshape(-1, *cage.shape[-2:]), 0, 1).reshape(cage.shape[-2], -1)
+        skin = np.moveaxis((level.matrix @ flat).reshape(level.matrix.shape[0], -1, 3), 1, 0)
+        skin = np.ascontiguousarray(skin).reshape(*batch, -1, 3)
+        if len(d.folds) and np.any(controls.folds):
+            skin += np.einsum("...f,fni->...ni", controls.folds, level.folds)
+        for i, (centre, rows) in enumerate(zip(d.eye_centres, level.lid_vertices, strict=True)):
+            self._rest_on_eyeball(skin, rows, centre, controls.eyes[..., 2 * i: 2 * i + 2])
+        pieces = [skin]
+        moved_cage = cage - self.deformer.neutral
+        for a in d.attachments:
+            pieces.append(a.move(moved_cage, controls, self.deformer))
+        vertices = np.concatenate(pieces, axis=-2)
+        return self._turn_head(vertices, controls.head, level.head_weight)
+
+    # -- inside -------------------------------------------------------------------------------------------------
+    def _rest_on_eyeball(self, skin: Array, rows: NDArray[np.int64], centre: Array, gaze: Array) -> None:
+        """Push lid vertices that would lie inside the eyeball out to its surface, in place."""
+        d = skin[..., rows, :] - centre
+        distance = np.linalg.norm(d, axis=-1)
+        yaw, pitch = np.radians(gaze[..., 0]), np.radians(gaze[..., 1])
+        axis = np.stack([np.sin(yaw) * np.cos(pitch), np.sin(pitch), np.cos(yaw) * np.cos(pitch)], axis=-1)
+        cosine = np.einsum("...ni,...i->...n", d, axis) / np.maximum(distance, 1e-9)
+        least = eyeball_radius(cosine) + LID_THICKNESS
+        push = np.where(d[..., 2] > 0, np.maximum(least / np.maximum(distance, 1e-9), 1.0), 1.0)
+        skin[..., rows, :] = centre + d * push[..., None]
+
+    def _turn_head(self, vertices: Array, head: Array, weight: Array) -> Array:
+        """Turn about the neck's pivot: yaw about y, then pitch about x, then roll about z; the neck follows."""
+        if not np.any(head):
+            return vertices
+        yaw, pitch, roll = (np.radians(head[..., i]) for i in range(3))
+        zero, one = np.zeros_like(yaw), np.ones_like(yaw)
+
+        def rows(*nine):
+            return np.stack(nine, axis=-1).reshape(*yaw.shape, 3, 3)
+
+        cy, sy, cp, sp, cr, sr = np.cos(yaw), np.sin(yaw), np.cos(pitch), np.sin(pitch), np.cos(roll), np.sin(roll)
+        turn = (rows(cy, zero, sy, zero, one, zero, -sy, zero, cy)
+                @ rows(one, zero, zero, zero, cp, sp, zero, -sp, cp)
+                @ rows(cr, sr, zero, -sr, cr, zero, zero, zero, one))
+        at = vertices - self._data.head_pivot
+        turned = at @ np.swapaxes(turn, -1, -2)
+        turned[..., 2] += head[..., 3, None]
+        return vertices + weight * (turned - at)
+
+    def _level(self, detail: int) -> _Level:
+        if isinstance(detail, bool) or detail not in range(MAX_DETAIL + 1):
+            raise InputError(f"detail: expected a subdivision level 0 to {MAX_DETAIL}, got {detail!r}")
+        detail = int(detail)
+        if detail not in self._levels:
+            self._levels[detail] = self._build_level(detail)
+        return self._levels[detail]
+
+    @cached_property
+    def _subdivisions(self):
+        d = self._data
+        levels = [loop_once(len(self.deformer.neutral), d.faces, d.creases, corners=d.corners)]
+        for _ in range(MAX_DETAIL - 1):
+            last = levels[-1]
+            levels.append(loop_once(last.matrix.shape[0], last.faces, last.creases, corners=d.corners))
+        return levels
+
+    def _build_level(self, detail: int) -> _Level:
+        d, subs, n_cage = self._data, self._subdivisions, len(self.deformer.neutral)
+        # Vertices of a level keep their index in finer ones: sample the finest surface at this level's vertices.
+        n = n_cage if detail == 0 else subs[detail - 1].matrix.shape[0]
+        matrix = sparse.csr_array(sparse.identity(n_cage, format="csr"))
+        for s in subs[:-1]:
+            matrix = s.matrix @ matrix
+        matrix = sparse.csr_array(subs[-1].matrix[:n] @ matrix)
+        parent = np.arange(len(d.faces))
+        for s in subs[:detail]:
+            parent = parent[s.parent_face]
+        faces = d.faces if detail == 0 else subs[detail - 1].faces
+        neutral = matrix @ self.deformer.neutral
+        lids = []
+        for lid, centre, inner in zip(self.deformer.lids, d.eye_centres, d.lid_rims, strict=True):
+            carried = np.unique(np.concatenate([lid.vertices, d.lid_skin[len(lids)]]))
+            touched = np.asarray(abs(matrix[:, carried]).sum(axis=1)).reshape(-1) > 1e-9
+            inside = np.asarray(abs(matrix[:, inner]).sum(axis=1)).reshape(-1) > 1e-9
+            # the margin itself (a crease) does not depend on the rim behind it: it stays in
+            lids.append(np.flatnonzero(touched & ~inside))
+        for rows, centre in zip(lids, d.eye_centres, strict=True):
+            self._rest_on_eyeball(neutral, rows, centre, np.zeros(2))
+        skin = Mesh(neutral, faces, d.materials, d.face_materials[parent], ("skin",), np.zeros(len(faces), np.int32))
+        mesh = merge([skin, *(a.mesh for a in d.attachments)])
+        normals = vertex_normals(neutral, faces)
+        folds = np.array([fold_field(f, neutral, normals) for f in d.folds.values()]).reshape(len(d.folds), n, 3)
+        return _Level(matrix, mesh, tuple(lids), folds, d.head_weight(mesh.vertices))
+
+
+@cache
+def _shipped() -> Mapping[str, Path]:
+    return {p.parent.name: p for p in sorted(meshes_dir().glob("*/face.yaml"))}
+
+
+def face_names() -> tuple[str, ...]:
+    """Return the names of the shipped faces."""
+    return tuple(_shipped())
+
+
+def load_face(face: str | Path = "akimoto") -> Face:
+    """Return a face by the name of a shipped one, or by the path of a folder or ``face.yaml``.
+
+    >>> load_face().name
+    'akimoto'
+    """
+    shipped = _shipped()
+    if str(face) in shipped:
+        return _load(shipped[str(face)])
+    path = Path(face)
+    if path.is_dir():
+        path = path / "face.yaml"
+    if not path.is_file():
+        raise InputError(f"face: expected one of {', '.join(shipped)} or the path of a face.yaml, got {str(face)!r}"
+                         f"{nearest(str(face), shipped)}")
+    return _load(path.resolve())
+
+
+@cache
+def _load(path: Path) -> Face:
+    return Face(read_face(path))
+
+
+__all__ = ["Attachment", "Controls", "Face", "attach", "face_names", "load_face"]

@@ -1,0 +1,49 @@
+"""Corrective folds: the creases of skin that triangles moved by feature points smooth away.
+
+A fold is a valley along a curve with a ridge beside it, a displacement along the neutral normals. Expressions
+drive it by one number, so it stays linear: the field is computed once for a level of detail.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Fold:
+    """``along`` (k, 3) the valley's curve on the neutral face, mm; ``width`` its half width; ``depth`` below the
+    skin; ``ridge`` height of the bulge beside it, on the side that ``toward`` (3,) points to. All in mm.
+    """
+
+    along: Array
+    width: float
+    depth: float
+    ridge: float
+    toward: Array
+
+
+def fold_field(fold: Fold, vertices: Array, normals: Array) -> Array:
+    """Return the displacement (n, 3), mm, of each vertex at amount one; it fades toward the curve's ends."""
+    start, step = fold.along[:-1], np.diff(fold.along, axis=0)
+    length = np.linalg.norm(step, axis=1)
+    run = np.concatenate([[0.0], np.cumsum(length)])
+    offset = vertices[:, None] - start
+    t = np.clip(np.einsum("nsi,si->ns", offset, step) / length**2, 0.0, 1.0)
+    away = offset - t[..., None] * step
+    distance = np.linalg.norm(away, axis=2)
+    nearest = distance.argmin(axis=1)
+    rows = np.arange(len(vertices))
+    distance, away = distance[rows, nearest], away[rows, nearest]
+    place = (run[nearest] + t[rows, nearest] * length[nearest]) / run[-1]
+    fade = np.clip(np.minimum(place, 1.0 - place) / 0.3, 0.0, 1.0)
+    fade = fade * fade * (3.0 - 2.0 * fade)
+    side = distance * np.sign(away @ fold.toward)
+    u = side / fold.width
+    height = -fold.depth * np.exp(-u * u) + fold.ridge * np.exp(-((u - 2.0) ** 2) / 1.4)
+    height *= fade * (np.abs(u) < 6.0) * np.clip(normals[:, 2] * 4.0 + 1.0, 0.0, 1.0)
+    return height[:, None] * normals
