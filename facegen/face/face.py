@@ -140,9 +140,12 @@ class Face:
                 vectors[row] += self.deformer.jaw.movement(self.deformer.points[[row]], jaw_state)[0]
         eyes = np.array([deformation.eyes.get(k, 0.0) for k in ("yaw_L", "pitch_L", "yaw_R", "pitch_R")])
         lids = np.array([deformation.lids.get(k, 0.0) for k in ("upper_L", "lower_L", "upper_R", "lower_R")])
-        lids = lids + (d.lid_follow * -eyes[[1, 1, 3, 3]])
+        for i, pitch in enumerate(eyes[[1, 3]]):            # lids follow the gaze as far as they are open
+            pair = slice(2 * i, 2 * i + 2)
+            openness = 1.0 - np.clip(lids[pair].sum(), 0.0, 1.0)
+            lids[pair] += d.lid_follow[int(pitch > 0)] * abs(pitch) * openness
         head = np.array([*(deformation.head.get(k, 0.0) for k in ("yaw", "pitch", "roll")),
-                         deformation.head.get("forward", 0.0) * mouth[2] * (1 if units != "paper" else 1)])
+                         deformation.head.get("forward", 0.0) * mouth[2]])
         for name in deformation.folds:
             if name not in d.folds and not d.optional_points:
                 raise InputError(f"folds: {name!r} is no fold of the face {self.name!r}{nearest(name, d.folds)}")

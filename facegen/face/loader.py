@@ -49,7 +49,7 @@ class FaceData:
     eye_centres: Array
     lid_rims: tuple[NDArray[np.int32], ...]
     lid_skin: tuple[NDArray[np.int32], ...]
-    lid_follow: Array
+    lid_follow: Array           # (down or up, upper or lower lid): travel per degree of gaze
     head_pivot: Array
     head_weight: Callable[[Array], Array]
     head_half_height: float
@@ -150,13 +150,18 @@ def read_face(path: Path) -> FaceData:
         fields = entry.fields(required=("along", "width", "depth", "ridge", "toward"))
         folds[name] = Fold(np.array([e.vector() for e in fields["along"].each()]), fields["width"].number(1e-3),
                            fields["depth"].number(), fields["ridge"].number(), np.array(fields["toward"].vector()))
-    follow = [e.number() for e in top["lid_follow"].each()] if "lid_follow" in top else [0.0, 0.0]
-    if len(follow) != 2:
-        raise top["lid_follow"].wrong("two numbers: upper and lower lid's travel per degree of looking down")
+    follow = np.zeros((2, 2))
+    if "lid_follow" in top:
+        fields = top["lid_follow"].fields(required=("down", "up"))
+        for i, entry in enumerate((fields["down"], fields["up"])):
+            pair = [e.number() for e in entry.each()]
+            if len(pair) != 2:
+                raise entry.wrong("two numbers: the upper and the lower lid's travel per degree of gaze")
+            follow[i] = pair
     return FaceData(
         top["name"].text(), top["source"].text(), deformer, cage.faces, cage.materials, cage.face_materials, creases,
         corners, tuple(names), {**aliases, **at}, np.array(point_scale), scales, tuple(regions),
-        np.array(list(eyes.values())), tuple(rims), tuple(lid_skin), np.array([*follow, *follow]),
+        np.array(list(eyes.values())), tuple(rims), tuple(lid_skin), follow,
         np.array(head["pivot"].vector()), head_weight,
         top["head_half_height"].number(1e-6) if "head_half_height" in top else float(np.ptp(cage.vertices[:, 1]) / 2),
         attachments, folds, frozenset(top["optional_points"].texts()) if "optional_points" in top else frozenset())

@@ -97,11 +97,13 @@ def hair(surface, faces) -> Mesh:
 
 def mouth() -> Mesh:
     """The lining behind the teeth: an open bag, seen from inside."""
-    rings = [(21.0, -65.0, 18.0, 17.0), (14.0, -64.0, 25.0, 21.0), (2.0, -63.5, 31.5, 23.0), (-12.0, -63.0, 34.5, 22.0),
+    rings = [(21.0, -65.0, 18.0, 17.0), (-3.0, -63.5, 34.0, 23.5), (-12.0, -63.0, 34.5, 22.0),
              (-26.0, -63.0, 35.0, 20.5), (-38.0, -63.5, 30.0, 17.5), (-48.0, -65.0, 20.0, 13.0), (-54.0, -66.5, 8.0, 6.0)]
     n = 20
     angle = 2 * np.pi * (np.arange(n) + 0.5) / n
     points = [[w * np.cos(a), y + h * np.sin(a), z] for z, y, w, h in rings for a in angle]
+    for i, a in enumerate(angle):            # the rim meets the lips: far forward in the middle, back at the corners
+        points[i] = [31.0 * np.cos(a), -66.0 + 17.5 * np.sin(a), 1.0 + 21.0 * np.sin(a) ** 2]
     points.append([0.0, -67.0, -56.0])
     tri = []
     for r in range(len(rings) - 1):

@@ -532,7 +532,7 @@ def write(names, vertices, faces, materials, creases, corners) -> None:
              "# Vertices are 0-based indices into cage.obj. Written by fit_cage.py; see docs/face.md for the keys."]
     dump = lambda v: yaml.safe_dump(v, default_flow_style=True, width=10**6, sort_keys=False).strip()  # noqa: E731
     for key, value in data.items():
-        if key in ("points", "measures", "scales", "jaw", "eyes", "head", "folds"):
+        if key in ("points", "measures", "scales", "jaw", "eyes", "head", "folds", "lid_follow"):
             lines += [f"{key}:"] + [f"  {k}: {dump(v).removesuffix('...').strip()}" for k, v in value.items()]
         elif key in ("regions", "parts"):
             lines += [f"{key}:"] + [f"- {dump(r)}" for r in value]

@@ -1,0 +1,199 @@
+"""The Expression -> AU tables of Akimoto 1986, section 3.3 and figure 10: the common one, and one for each
+person.
+
+A person's habits override the common table: their ``happiness`` stands for everybody's, and so does every
+synonym.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cache
+from pathlib import Path
+
+from facegen.data import tables_dir
+from facegen.errors import InputError, NotationError, nearest
+from facegen.facs.notation import looks_like_units, parse
+from facegen.facs.units import Catalogue, load_catalogue
+from facegen.facs.validate import Entry
+from facegen.facs.yamlfile import SUFFIXES, read_data
+
+
+@dataclass(frozen=True)
+class Expression:
+    """A named set of unit weights. ``also`` lists its synonyms."""
+
+    name: str
+    units: Mapping[str, float]
+    about: str
+    source: str
+    also: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class ExpressionTable:
+    """The common table: ``expressions`` by name, ``aliases``: synonym -> name."""
+
+    expressions: Mapping[str, Expression]
+    aliases: Mapping[str, str]
+    source: str
+
+    @property
+    def words(self) -> tuple[str, ...]:
+        """Every name and synonym."""
+        return (*self.expressions, *self.aliases)
+
+    def find(self, word: str, person: Person | None = None) -> Expression | None:
+        """Return the expression of a name or synonym, the person's own before the common one, or None."""
+        name = fold_name(word)
+        own = person.expressions if person else {}
+        if name not in own and person:
+            name = person.aliases.get(name, name)
+        if name not in own:
+            name = self.aliases.get(name, name)
+        return own.get(name) or self.expressions.get(name)
+
+
+@dataclass(frozen=True)
+class Person:
+    """One person's habits: ``expressions`` that override common ones or are new, own ``aliases``."""
+
+    name: str
+    about: str
+    source: str
+    expressions: Mapping[str, Expression]
+    aliases: Mapping[str, str] = field(default_factory=dict)
+
+    @property
+    def words(self) -> tuple[str, ...]:
+        """Every name and synonym of this person's own."""
+        return (*self.expressions, *self.aliases)
+
+
+def fold_name(word: str) -> str:
+    """Return a name as tables write it.
+
+    >>> fold_name(" Happily Surprised ")
+    'happily_surprised'
+    """
+    return re.sub(r"[\s_-]+", "_", word.strip().casefold())
+
+
+def is_path(text: str) -> bool:
+    """Return whether a text is meant as a file's path; the slash of a script such as 26/27 makes none."""
+    slash = any(c in text for c in {"/", os.sep, os.altsep or "/"})
+    return text.lower().endswith(SUFFIXES) or (slash and not looks_like_units(text))
+
+
+def load_expressions(path: str | Path | None = None) -> ExpressionTable:
+    """Return the shipped table of expressions (read once) or another of the same form."""
+    return _shipped() if path is None else _read_expressions(Path(path))
+
+
+@cache
+def _shipped() -> ExpressionTable:
+    return _read_expressions(tables_dir() / "expressions.yaml")
+
+
+def people() -> tuple[str, ...]:
+    """Return the names of the shipped people."""
+    return tuple(sorted(path.stem for path in (tables_dir() / "people").glob("*.yaml")))
+
+
+def load_person(name_or_path: str | Path | Person, *, expressions: ExpressionTable | None = None) -> Person:
+    """Return a shipped person by name, or one's own by the path of a file.
+
+    Raises InputError for an unknown name, FileError or TableError for a file.
+    """
+    if isinstance(name_or_path, Person):
+        return name_or_path
+    if not isinstance(name_or_path, (str, Path)):
+        raise InputError(f"person: expected a name or a path, got {type(name_or_path).__name__}")
+    expressions = expressions or load_expressions()
+    if isinstance(name_or_path, Path) or is_path(name_or_path):
+        return _read_person(Path(name_or_path), expressions)
+    name = fold_name(name_or_path)
+    if name not in people():
+        raise InputError(f"person: unknown person '{name_or_path}'{nearest(name, people())} "
+                         f"(shipped: {', '.join(people())}; or give the path of a .yaml file)")
+    return _read_person(tables_dir() / "people" / f"{name}.yaml", expressions)
+
+
+def _name(entry: Entry, name: str) -> str:
+    """Return a name that is fit for a table."""
+    if name != fold_name(name) or not name.isidentifier() or looks_like_units(name):
+        raise entry.fail(f"'{name}' is no name for an expression: use small letters, digits and _, "
+                         "beginning with a letter, and nothing that reads as an action unit")
+    return name
+
+
+def _expression(name: str, entry: Entry, catalogue: Catalogue, sources: Mapping[str, str] | None,
+                source: str = "") -> Expression:
+    """Return one checked expression; ``sources`` None: all share ``source``."""
+    fields = entry.fields(required=("units", "about", *(("source",) if sources is not None else ())),
+                          optional=("also",))
+    _name(entry, name)
+    try:
+        value = fields["units"].value  # a bare 0 or 12 reads as a number
+        weights = parse(str(value) if type(value) is int else fields["units"].text(), catalogue=catalogue)
+    except NotationError as error:
+        raise fields["units"].fail(str(error)) from error
+    if sources is not None:
+        source = sources[fields["source"].choice(sources, "source")]
+    also = tuple(_name(one, one.text()) for one in fields["also"].each()) if "also" in fields else ()
+    return Expression(name, weights, fields["about"].text(), source, also)
+
+
+def _read_expressions(path: Path) -> ExpressionTable:
+    fields = Entry(read_data(path), str(path)).fields(required=("sources", "expressions"))
+    sources = {key: entry.text() for key, entry in fields["sources"].items()}
+    catalogue = load_catalogue()
+    entries = dict(fields["expressions"].items())
+    table = {name: _expression(name, entry, catalogue, sources) for name, entry in entries.items()}
+    if "neutral" not in table or table["neutral"].units:
+        raise fields["expressions"].fail("the expression 'neutral' is missing or not 0")
+    return ExpressionTable(table, _aliases(table, entries), "; ".join(sources.values()))
+
+
+def _aliases(table: Mapping[str, Expression], entries: Mapping[str, Entry]) -> dict[str, str]:
+    """Return synonym -> name; a synonym that means two things is an error."""
+    aliases: dict[str, str] = {}
+    for name, expression in table.items():
+        for word in expression.also:
+            other = word if word in table else aliases.get(word)
+            if other:
+                raise entries[name].fail(f"also: '{word}' already means the expression '{other}'")
+            aliases[word] = name
+    return aliases
+
+
+def _read_person(path: Path, common: ExpressionTable) -> Person:
+    root = Entry(read_data(path), str(path))
+    fields = root.fields(required=("about", "source"), optional=("name", "overrides", "adds", "aliases"))
+    source, catalogue = fields["source"].text(), load_catalogue()
+    table: dict[str, Expression] = {}
+    entries: dict[str, Entry] = {}
+    for key in ("overrides", "adds"):
+        for name, entry in fields[key].items() if key in fields else ():
+            known = name in common.expressions
+            if key == "overrides" and not known:
+                hint = f"; '{name}' is a synonym of '{common.aliases[name]}': override that" \
+                    if name in common.aliases else nearest(name, common.expressions) or ""
+                raise entry.fail(f"unknown expression '{name}'{hint} (a new one belongs under 'adds')")
+            if key == "adds" and known:
+                raise entry.fail(f"'{name}' is an expression of the common table: put it under 'overrides'")
+            table[name] = _expression(name, entry, catalogue, None, source)
+            entries[name] = entry
+    if not table and "aliases" not in fields:
+        raise root.fail("a person has at least one of: overrides, adds, aliases")
+    aliases = _aliases(table, entries)
+    for word, entry in fields["aliases"].items() if "aliases" in fields else ():
+        _name(entry, word)
+        if word in table or word in aliases:
+            raise entry.fail(f"'{word}' already means an expression of this person")
+        aliases[word] = entry.choice((*table, *common.expressions), "expression")
+    name = fields["name"].text() if "name" in fields else path.stem
+    return Person(name, fields["about"].text(), source, table, aliases)
