@@ -26,6 +26,7 @@ OPTIONAL = ("sheets", "followers", "creases", "corners", "parts", "folds", "lid_
             "head_half_height")
 CARRIERS = ("skull", "skin", "jaw", "eye", "mouth")
 ROLES = ("input", "jaw", "fixed")
+_FARTHEST = 1e6     # mm: no face is larger
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,7 +86,7 @@ def read_face(path: Path) -> FaceData:
             raise entry.fail("a feature point needs either vertex or at")
         fields["role"].choice(ROLES, "role")
         places.append(cage.vertices[index(fields["vertex"])] if "vertex" in fields
-                      else np.array(fields["at"].vector()))
+                      else np.array(fields["at"].vector(_FARTHEST)))
         point_scale.append(scales[fields["scale"].choice(scales, "scale")])
         jaw_share.append(fields["jaw"].number(0, 1) if "jaw" in fields else 0.0)
         if "paper" in fields:
@@ -112,13 +113,13 @@ def read_face(path: Path) -> FaceData:
     for key, entry in top["followers"].items() if "followers" in top else ():
         followers[index(Entry(_integer(key), entry.source, entry.path))] = {
             index(Entry(_integer(k), e.source, e.path)): e.number(0, 1) for k, e in entry.items()}
-    weights, rigid = region_weights(cage.vertices, np.array(places), regions, np.array(top["centre_O"].vector()), sheets,
+    weights, rigid = region_weights(cage.vertices, np.array(places), regions, np.array(top["centre_O"].vector(_FARTHEST)), sheets,
                                     followers)
 
     jaw_fields = top["jaw"].fields(required=("rule", "hinge", "glide"))
-    jaw = Jaw(np.array(jaw_fields["hinge"].vector()), np.array(jaw_fields["glide"].vector()),
+    jaw = Jaw(np.array(jaw_fields["hinge"].vector(_FARTHEST)), np.array(jaw_fields["glide"].vector(_FARTHEST)),
               jaw_fields["rule"].choice(("vertices", "points"), "rule"))
-    eyes = {k: np.array(e.vector()) for k, e in top["eyes"].fields(required=("L", "R")).items()}
+    eyes = {k: np.array(e.vector(_FARTHEST)) for k, e in top["eyes"].fields(required=("L", "R")).items()}
     lids, rims, lid_skin = [], [], []
     for side, entry in top["lids"].fields(required=("L", "R")).items():
         fields = entry.fields(required=("columns", "movers", "rims", "skin"))
@@ -134,7 +135,7 @@ def read_face(path: Path) -> FaceData:
     deformer = Deformer(cage.vertices, np.array(places), weights, rigid, np.array(jaw_share), jaw, tuple(lids))
 
     head = top["head"].fields(required=("pivot", "moves_above", "rests_below"))
-    high, low = np.array(head["moves_above"].vector()), np.array(head["rests_below"].vector())
+    high, low = np.array(head["moves_above"].vector(_FARTHEST)), np.array(head["rests_below"].vector(_FARTHEST))
 
     def head_weight(vertices: Array) -> Array:
         t = np.clip((vertices - low) @ (high - low) / ((high - low) @ (high - low)), 0.0, 1.0)
@@ -148,8 +149,8 @@ def read_face(path: Path) -> FaceData:
     folds = {}
     for name, entry in top["folds"].items() if "folds" in top else ():
         fields = entry.fields(required=("along", "width", "depth", "ridge", "toward"))
-        folds[name] = Fold(np.array([e.vector() for e in fields["along"].each()]), fields["width"].number(1e-3),
-                           fields["depth"].number(), fields["ridge"].number(), np.array(fields["toward"].vector()))
+        folds[name] = Fold(np.array([e.vector(_FARTHEST) for e in fields["along"].each()]), fields["width"].number(1e-3),
+                           fields["depth"].number(), fields["ridge"].number(), np.array(fields["toward"].vector(_FARTHEST)))
     follow = np.zeros((2, 2))
     if "lid_follow" in top:
         fields = top["lid_follow"].fields(required=("down", "up"))
@@ -162,7 +163,7 @@ def read_face(path: Path) -> FaceData:
         top["name"].text(), top["source"].text(), deformer, cage.faces, cage.materials, cage.face_materials, creases,
         corners, tuple(names), {**aliases, **at}, np.array(point_scale), scales, tuple(regions),
         np.array(list(eyes.values())), tuple(rims), tuple(lid_skin), follow,
-        np.array(head["pivot"].vector()), head_weight,
+        np.array(head["pivot"].vector(_FARTHEST)), head_weight,
         top["head_half_height"].number(1e-6) if "head_half_height" in top else float(np.ptp(cage.vertices[:, 1]) / 2),
         attachments, folds, frozenset(top["optional_points"].texts()) if "optional_points" in top else frozenset())
 

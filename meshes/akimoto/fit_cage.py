@@ -244,10 +244,10 @@ def strips(names, positions, tri, index):
         out = np.asarray(positions[m]) - middle
         out[2] = 0
         d = np.asarray(positions[m]) - eye + 1.6 * out / np.linalg.norm(out)
-        rim.append(add(f"lid_rim_{i}", eye + 13.4 * d / np.linalg.norm(d)))
+        rim.append(add(f"lid_rim_{i}", design.LID_RIM.get(i, eye + 13.4 * d / np.linalg.norm(d))))
     for i in range(10):
         j = (i + 1) % 10
-        quad(margin[i], margin[j], rim[j], rim[i], "lashes" if i < 5 else "skin")
+        quad(margin[i], margin[j], rim[j], rim[i], "lips" if i in (0, 9) else "lashes" if i < 5 else "skin")
 
     def lip_ring(name, offsets):
         """The seam's ring moved by the offsets: upper middle .. corner .. lower middle."""

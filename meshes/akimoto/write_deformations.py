@@ -64,7 +64,7 @@ UNITS: dict[str, dict] = {
     "16": {"fit": {"mouthLowerDownLeft": 1.55}, "open": True},
     "17": {"fit": {"mouthShrugLower": 1.0}, "folds": {"chin": 1.0}},
     "18": {"fit": {"mouthPucker": 1.0}},
-    "19": {"by_hand": {"tongue_tip": (0, 2.6, 25.0), "lip_lower": (0, -2.2, 0.6), "lip_lower_border": (0, -2.0, 0.8),
+    "19": {"by_hand": {"tongue_tip": (0, 1.6, 38.0), "lip_lower": (0, -2.2, 0.6), "lip_lower_border": (0, -2.0, 0.8),
                        "lip_lower_inner_L": (0, -2.1, 0.6), "lip_lower_side_L": (0, -1.4, 0.3),
                        "lip_upper": (0, 1.4, 0.4), "lip_upper_inner_L": (0, 1.3, 0.4), "lip_upper_side_L": (0, 0.8, 0.2),
                        "lip_lower_border_side_L": (0, -1.2, 0.4)},
