@@ -79,6 +79,7 @@ def parse_weights(weights: Mapping[str | int, float], *,
         if term.code == "0":
             continue
         weight = catalogue.from_openface(weight) if term.column == "r" else weight
+        catalogue.expand({term.code: weight})  # refuses a weight outside 0..1
         for atom in catalogue.expand({term.code: 1.0}):
             if result.setdefault(atom, weight) != weight:
                 raise InputError(f"unit {atom}: given twice, as {result[atom]:g} and as {weight:g}")
@@ -227,10 +228,11 @@ class _Parser:
                 side = match[1][0].upper()
             elif not letter and not column and (match := self.take(_LETTER)):
                 letter = match[1].upper()
-            elif value is None and (match := self.take(_VALUE)):
+            elif match := self.take(_VALUE):
                 if letter:
                     raise self.error("give a letter or a number, not both", here)
                 value = self.value(match, column)
+                break  # the number ends the unit
             elif self.text[here].isalpha() or self.text[here] == "_":
                 raise self.intensity(number, here)
             else:

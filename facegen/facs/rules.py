@@ -33,13 +33,12 @@ class Rule:
     why: str
     add: Deformation = field(default_factory=Deformation)
 
-    def correctives(self) -> dict[str, Deformation]:
-        """Return the corrective deformation by coefficient name; sided data are the left half."""
+    @property
+    def correctives(self) -> tuple[str, ...]:
+        """The coefficients of what is added: one a side where sides matter, "1+4:L"."""
         if not self.add:
-            return {}
-        if self.places == ("L", "R"):
-            return {f"{self.name}:L": self.add, f"{self.name}:R": self.add.mirrored()}
-        return {self.name: self.add}
+            return ()
+        return (f"{self.name}:L", f"{self.name}:R") if self.places == ("L", "R") else (self.name,)
 
 
 @dataclass(frozen=True)
@@ -89,9 +88,8 @@ def coefficients(catalogue: Catalogue, rules: tuple[Rule, ...], limits: tuple[Li
                 own = _weight(catalogue, atoms, number, place)
                 left[place] = max(0.0, 1.0 - _weight(catalogue, atoms, other, place) / own) if own else 1.0
             apply(number, left)
-        for name in rule.correctives():
-            extra[name] = strength[name[-1]] if len(rule.places) == 2 and name.endswith((":L", ":R")) else \
-                sum(strength.values()) / len(strength)
+        for name in rule.correctives:
+            extra[name] = strength.get(name.rpartition(":")[2], sum(strength.values()) / len(strength))
     for limit in limits:
         if len(active.intersection(limit.units)) < 2:
             continue

@@ -45,17 +45,16 @@ class UnitTable:
     places: Mapping[str, tuple[str, str]]  # where each member of basis is written: file, key path
 
     def coefficients(self, weights: Mapping[str, float]) -> dict[str, float]:
-        """Return the coefficient of each member of ``basis`` for code -> weight (0..1), after all
-        combinations.
+        """Return the coefficients of ``basis`` for code -> weight (0..1), after all combinations.
 
         Raises InputError for an unknown code or a weight outside 0..1.
         """
         return combining.coefficients(self.catalogue, self.rules, self.limits, self.catalogue.expand(weights))
 
     def deformation(self, weights: Mapping[str, float]) -> tuple[Deformation, list[str]]:
-        """Return the deformation of code -> weight and the warnings; lid and fold sums may pass 1: the face
-        stops them.
+        """Return the deformation of code -> weight, and the warnings.
 
+        Lids and folds are plain sums and may pass 1: where lids meet and folds end is the face's to know.
         Raises InputError for an unknown code or a weight outside 0..1.
         """
         found = self.coefficients(weights)
@@ -118,8 +117,8 @@ def _load(path: Path) -> UnitTable:
     for i, rule in enumerate(rules):
         if rule.add.has_lengths and rule.add.units != units:
             raise others["combinations"].each()[i].fail(f"add.units: expected '{units}' as in {file.name}")
-        for name, deformation in rule.correctives().items():
-            basis[name] = deformation
+        for name in rule.correctives:
+            basis[name] = rule.add.mirrored() if name.endswith(":R") else rule.add
             places[name] = (str(path), f"combinations.{i}.add")
     source = fields["source"].text()
     return UnitTable(catalogue, basis, rules, limits, antagonists, units, source, str(path), places)
@@ -144,7 +143,7 @@ def _basis(catalogue: Catalogue, entry: Entry,
     for key, one in written.items():
         Entry(key, one.source, one.path).choice(expected, "unit")
     basis: dict[str, Deformation] = {}
-    places: dict[str, str] = {}
+    places: dict[str, tuple[str, str]] = {}
 
     def build(key: str, asked: tuple[str, ...] = ()) -> dict[str, Deformation]:
         """Return prefix -> deformation of one key: its own data, or those of the unit it refers to."""
@@ -161,9 +160,10 @@ def _basis(catalogue: Catalogue, entry: Entry,
             fields = one.fields(required=(kind,), optional=("scale",))
             scale = fields["scale"].number(0.0, 2.0) if "scale" in fields else 1.0
             target = build(fields[kind].choice(expected, "unit"), (*asked, key))
-            if set(target) != set(marks):
+            if len(target) != len(marks):
                 raise fields[kind].fail("refers to a unit with other sides")
-            return {mark: (d.mirrored() if kind == "mirror_of" else d) * scale for mark, d in target.items()}
+            return {mark: (d.mirrored() if kind == "mirror_of" else d) * scale
+                    for mark, d in zip(marks, target.values(), strict=True)}
         one.fields(optional=_UNIT_KEYS)
         own = deformation_from_entry(Entry({**one.value, "units": units}, one.source, one.path))
         if marks == ("L", "R"):

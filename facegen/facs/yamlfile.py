@@ -62,6 +62,8 @@ def parse_json(text: str, source: str) -> object:
 
     try:
         return json.loads(text, object_pairs_hook=unique)
+    except TableError:
+        raise
     except json.JSONDecodeError as error:
         raise TableError(f"{source}: line {error.lineno}, column {error.colno}: {error.msg}") from error
     except (RecursionError, ValueError) as error:  # ValueError: an integer of thousands of digits
