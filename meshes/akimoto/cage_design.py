@@ -305,7 +305,8 @@ def followers() -> dict[str, dict[str, float]]:
 
 
 # How far the skin behind a lid's margin goes with it.
-CREASE_SHARE_UPPER, CREASE_SHARE_LOWER = 0.42, 0.30
+# Upper lid from the inner to the outer corner, lower lid likewise.
+CREASE_SHARE_UPPER, CREASE_SHARE_LOWER = (0.50, 0.62, 0.84, 0.68), (0.60, 0.90, 0.95, 0.75)
 
 JAW_HINGE = (0.0, -32.0, -62.0)
 JAW_GLIDE = (0.0, 0.119, 0.340)      # mm per degree: 2.9 and 8.3 mm at 24.4 degrees, as measured on the teeth

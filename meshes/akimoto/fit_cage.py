@@ -328,6 +328,7 @@ def orient(positions, tri):
 
 # -- fit --------------------------------------------------------------------------------------------------------
 INSIDE = ("lid_rim", "lip_inner", "lip_deep", "nostril_in")   # turned inward: follow, are not fitted
+RINGS = ("lid_crease", "orbit", "lip_border", "lip_belly", "surround", "brow", "nostril", "wing")
 EAR = ("ear_rim", "ear_fold", "ear_concha")
 
 
@@ -382,8 +383,12 @@ def fit(full_names, full, faces, creases, corners, other, n_half, target, parts,
     lap0 = lap @ full
     inside = np.array([n.rsplit("_", 1)[0].startswith(INSIDE) if n[-2:] in ("_L", "_R") else n.startswith(INSIDE)
                        for n in full_names])
-    lm_rows = sub.matrix[np.array([i for i, _ in landmarks])]
-    lm_at = np.array([x for _, x in landmarks])
+    # every outer control point's place on the surface stays near where the layout put it, ring points more so
+    placed = np.flatnonzero(weight[: len(full)] > 0)
+    ring = np.array([full_names[i].startswith(RINGS) for i in placed])
+    pull = np.concatenate([np.full(len(landmarks), 30.0), np.where(ring, 0.7, 0.12)])
+    lm_rows = sparse.diags_array(pull) @ sub.matrix[np.array([i for i, _ in landmarks] + placed.tolist())]
+    lm_at = pull[:, None] * np.concatenate([np.array([x for _, x in landmarks]), full[placed]])
     for it in range(rounds):
         fair = max(0.012, 0.5 * 0.8 ** it)
         whole = np.column_stack([expand[a] @ c[:, a] for a in range(3)])
@@ -398,9 +403,9 @@ def fit(full_names, full, faces, creases, corners, other, n_half, target, parts,
         for a in range(3):
             s = sparse.diags_array(np.sqrt(w * 0.04)) @ sub.matrix @ expand[a]
             reg = sparse.diags_array(np.sqrt(stiff)) @ lap @ expand[a]
-            lm = 30.0 * (lm_rows @ expand[a])
+            lm = lm_rows @ expand[a]
             blocks.append([s, reg, lm])
-            rhs.append([np.sqrt(w * 0.04) * q[:, a], np.sqrt(stiff) * lap0[:, a], 30.0 * lm_at[:, a]])
+            rhs.append([np.sqrt(w * 0.04) * q[:, a], np.sqrt(stiff) * lap0[:, a], lm_at[:, a]])
         plane = sparse.hstack([sparse.diags_array(np.sqrt(w) * tn[:, a]) @ sub.matrix @ expand[a] for a in range(3)])
         big = sparse.vstack([plane] + [
             sparse.hstack([blocks[a][k] if b == a else sparse.csr_array((blocks[a][k].shape[0], n_half))
@@ -508,7 +513,7 @@ def write(names, vertices, faces, materials, creases, corners) -> None:
         movers = []
         for i, col in column.items():
             lower = i > 5
-            share = design.CREASE_SHARE_LOWER if lower else design.CREASE_SHARE_UPPER
+            share = (design.CREASE_SHARE_LOWER if lower else design.CREASE_SHARE_UPPER)[col]
             for ring, part in (("lid_margin", 1.0), ("lid_rim", 1.0), ("lid_crease", share)):
                 movers.append([at[f"{ring}_{i}_{s}"], col, "lower" if lower else "upper", part])
         lids[s] = {"columns": [[at[f"lid_margin_{a}_{s}"], at[f"lid_margin_{b}_{s}"]]

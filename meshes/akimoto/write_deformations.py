@@ -145,7 +145,10 @@ UNITS: dict[str, dict] = {
     "55": {"head": {"roll": 20}}, "56": {"mirror_of": "55"},
     "57": {"head": {"forward": 0.4}}, "58": {"head": {"forward": -0.3}},
     "61": {"eyes": {"yaw_L": 25, "yaw_R": 25}}, "62": {"mirror_of": "61"},
-    "63": {"eyes": {"pitch_L": 20}}, "64": {"eyes": {"pitch_L": -25}},
+    "63": {"eyes": {"pitch_L": 20}, "fit": {"eyeLookUpLeft": 1.0, "eyeLookUpRight": 1.0}, "lids_follow": (-0.17, 0.24),
+           "margin": False},
+    "64": {"eyes": {"pitch_L": -25}, "fit": {"eyeLookDownLeft": 1.0, "eyeLookDownRight": 1.0},
+           "lids_follow": (0.475, -0.05), "margin": False},
     "65": {"eyes": {"yaw_L": 12}}, "66": {"eyes": {"yaw_L": -18}},
 }
 
@@ -223,10 +226,10 @@ class Maker:
             m = 0
             for name, factor in r["fit"].items():
                 m = m + self.measured(name) * (self.blink_factor() if factor == "meet" else factor)
-            lids = r.get("lids", (0, 0))
+            lids = r.get("lids", r.get("lids_follow", (0, 0)))      # what the face does by itself is not in the table
             if "plus" in r:
                 lids = (0, 0)
-            v = s.fit(m, lids=(*lids, 0, 0), sealed=sealed, symmetric=not sided or r.get("half", False),
+            v = s.fit(m, lids=(*lids, *(lids if code in SYMMETRIC else (0, 0))), sealed=sealed, symmetric=not sided or r.get("half", False),
                       lids_closed=not r.get("margin", True))
         if "fit_after_jaw" in r:
             name, factor = r["fit_after_jaw"]
@@ -246,7 +249,7 @@ class Maker:
         return v
 
 
-SYMMETRIC = ("17", "18", "19", "21", "T22", "B22", "T23", "B23", "24", "26", "27", "T28", "B28", "29", "T32", "B32", "33")
+SYMMETRIC = ("17", "18", "19", "21", "T22", "B22", "T23", "B23", "24", "26", "27", "T28", "B28", "29", "T32", "B32", "33", "63", "64")
 
 
 # measured unit -> the unit of ours that shows the same thing (left forms where there are sides).
