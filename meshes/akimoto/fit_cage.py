@@ -429,10 +429,13 @@ def report(c_full, faces, creases, corners, target, parts):
     fitted = Surface(x, sub.faces)
     skin = np.unique(parts["skin"])
     normals = vertex_normals(target, parts["skin"])
+    blockers = np.concatenate([parts[k] for k in ("skin", "eye_l", "eye_r")])
     seen = []
-    for v in skin:      # visible from outside: a short ray along the normal leaves the head
-        p, n = target[v], normals[v]
-        seen.append(p[2] > -52 and p[1] > -112 and first_hit(p + 0.05 * n, n, target, parts["skin"]) is None)
+    for v in skin:      # outermost as seen from the middle of the head: no inside of mouth, nostrils, eye sockets
+        ray = target[v] - design.VIEW_CENTRE
+        ray /= np.linalg.norm(ray)
+        seen.append(target[v, 2] > -52 and target[v, 1] > -112 and abs(target[v, 0]) < 72
+                    and first_hit(target[v] + 0.05 * ray, ray, target, blockers) is None)
     v = skin[np.array(seen)]
     _, d, _ = fitted.closest(target[v], normals[v], cosine=0.0)
     d = d[d < 100]

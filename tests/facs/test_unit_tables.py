@@ -101,6 +101,9 @@ def test_declared_combinations():
     assert full({"25": 1, "26": 1})["L25"] < 1
     assert full({"24": 1, "25": 1})["24"] < 0.5
     assert "26" not in full({"26": 0.5, "27": 0.8})
+    whole = next(rule for rule in TABLE.rules if rule.when == ("1", "2", "4"))
+    assert full({"1": 1, "2": 1, "4": 1}) == {f"{side}{n}": pytest.approx(whole.scale[n])  # no pair rule too
+                                              for n in ("1", "2", "4") for side in "LR"}
     assert full({"26": 1.0, "27": 0.25})["26"] == 0.75
     assert "L5" not in full({"5": 1, "43": 1})
     assert full({"18": 1, "22": 1})["18"] + full({"18": 1, "22": 1})["T22"] <= 1.2 + 1e-12
