@@ -32,6 +32,9 @@ from facegen.geometry.subdivision import loop_once
 MAX_DETAIL = 3
 """Finest subdivision level; every level samples the surface of this one."""
 
+DEEPEST_FOLD = 1.25
+"""Largest amount of a fold."""
+
 LID_THICKNESS = 0.3
 """Millimetres of skin between a lid's surface and the eyeball, at least."""
 
@@ -102,15 +105,19 @@ class Face:
         :class:`Deformation`, or the path of a deformation file. ``person``: whose table overrides the common
         one, by name or path. ``intensity`` scales the expression. InputError says what cannot be understood.
         """
-        return self.pose_controls(self.controls(self.resolve(what, person=person, intensity=intensity).deformation),
-                                  detail=detail)
+        found = self.resolve(what, person=person, intensity=intensity)
+        return self.pose_controls(self.controls(found.deformation, strict=not found.units), detail=detail)
 
     def resolve(self, what: Any, *, person: Any = None, intensity: float = 1.0) -> Resolution:
         """Return the chain name -> units -> deformation data (Akimoto 1986, fig. 10)."""
         return resolve(what, person=person, intensity=intensity)
 
-    def controls(self, deformation: Deformation) -> Controls:
-        """Return the deformer's input, mm and degrees, for deformation data in its own units."""
+    def controls(self, deformation: Deformation, *, strict: bool = True) -> Controls:
+        """Return the deformer's input, mm and degrees, for deformation data in its own units.
+
+        A feature point or fold that this face lacks, or a point that takes no input, is an InputError; with
+        ``strict=False`` it is passed over: a face of fifteen points takes of the common tables what it can.
+        """
         d = self._data
         units = deformation.units
         if units == "face":
@@ -122,20 +129,16 @@ class Face:
             mouth = scale[0]
         vectors = np.zeros((len(d.point_names), 3))
         for name, vector in deformation.points.items():
-            row = d.point_index.get(name)
+            row = self._point(name, strict)
             if row is None:
-                if name in d.optional_points and units == "face":
-                    continue
-                raise InputError(f"points: {name!r} is no feature point of the face {self.name!r}"
-                                 f"{nearest(name, d.point_index)}")
+                continue
             vectors[row] += np.asarray(vector, float) * scale[row]
         jaw = deformation.jaw
         jaw_state = np.array([jaw.get("open", 0.0), jaw.get("side", 0.0) * mouth[0], jaw.get("forward", 0.0) * mouth[2]])
         for name in deformation.with_jaw:
-            row = d.point_index.get(name)
+            row = self._point(name, strict)
             if row is None:
-                raise InputError(f"with_jaw: {name!r} is no feature point of the face {self.name!r}"
-                                 f"{nearest(name, d.point_index)}")
+                continue
             if not self.deformer.jaw_share[row]:
                 vectors[row] += self.deformer.jaw.movement(self.deformer.points[[row]], jaw_state)[0]
         eyes = np.array([deformation.eyes.get(k, 0.0) for k in ("yaw_L", "pitch_L", "yaw_R", "pitch_R")])
@@ -147,9 +150,10 @@ class Face:
         head = np.array([*(deformation.head.get(k, 0.0) for k in ("yaw", "pitch", "roll")),
                          deformation.head.get("forward", 0.0) * mouth[2]])
         for name in deformation.folds:
-            if name not in d.folds and not d.optional_points:
+            if name not in d.folds and strict:
                 raise InputError(f"folds: {name!r} is no fold of the face {self.name!r}{nearest(name, d.folds)}")
-        folds = np.array([deformation.folds.get(k, 0.0) for k in d.folds])
+        # Folds saturate: two units that crease the same skin do not crease it twice as deep.
+        folds = np.minimum(np.array([deformation.folds.get(k, 0.0) for k in d.folds]), DEEPEST_FOLD)
         return Controls(vectors, jaw_state, lids, eyes, head, folds)
 
     def pose_controls(self, controls: Controls, *, detail: int = 2) -> Array:
@@ -173,6 +177,20 @@ class Face:
             pieces.append(a.move(moved_cage, controls, self.deformer))
         vertices = np.concatenate(pieces, axis=-2)
         return self._turn_head(vertices, controls.head, level.head_weight)
+
+    def _point(self, name: str, strict: bool) -> int | None:
+        """Return the row of a feature point that takes input, or None for one to be passed over."""
+        d = self._data
+        row = d.point_index.get(name)
+        if row is not None and d.takes_input[row]:
+            return row
+        if not strict:
+            return None
+        if row is None:
+            raise InputError(f"points: {name!r} is no feature point of the face {self.name!r}"
+                             f"{nearest(name, d.point_index)}")
+        raise InputError(f"points: {name!r} of the face {self.name!r} takes no vector: it is fixed or turns with the "
+                         f"jaw; give one of {', '.join(n for n, i in d.point_index.items() if d.takes_input[i])[:300]}")
 
     # -- inside -------------------------------------------------------------------------------------------------
     def _rest_on_eyeball(self, skin: Array, rows: NDArray[np.int64], centre: Array, gaze: Array) -> None:

@@ -22,8 +22,7 @@ from facegen.geometry.subdivision import loop_levels
 
 REQUIRED = ("name", "source", "cage", "centre_O", "measures", "scales", "points", "regions", "jaw", "eyes", "lids",
             "head")
-OPTIONAL = ("sheets", "followers", "creases", "corners", "parts", "folds", "lid_follow", "optional_points",
-            "head_half_height")
+OPTIONAL = ("sheets", "followers", "creases", "corners", "parts", "folds", "lid_follow", "head_half_height")
 CARRIERS = ("skull", "skin", "jaw", "eye", "mouth")
 ROLES = ("input", "jaw", "fixed")
 _FARTHEST = 1e6     # mm: no face is larger
@@ -31,8 +30,7 @@ _FARTHEST = 1e6     # mm: no face is larger
 
 @dataclass(frozen=True, eq=False)
 class FaceData:
-    """A face as loaded; arrays in millimetres. ``optional_points``: points of the common tables that this face
-    may lack (a face with fewer points takes of a unit what it can)."""
+    """A face as loaded; arrays in millimetres."""
 
     name: str
     source: str
@@ -56,7 +54,7 @@ class FaceData:
     head_half_height: float
     attachments: tuple[Attachment, ...]
     folds: Mapping[str, Fold]
-    optional_points: frozenset[str]
+    takes_input: NDArray[np.bool_]
 
 
 def read_face(path: Path) -> FaceData:
@@ -78,13 +76,18 @@ def read_face(path: Path) -> FaceData:
     scales = {k: np.array([measures[m.choice(measures, "measure")] for m in e.each()])
               for k, e in top["scales"].items()}
 
+    jaw_fields = top["jaw"].fields(required=("rule", "hinge", "glide"))
+    rule = jaw_fields["rule"].choice(("vertices", "points"), "rule")
+    jaw = Jaw(np.array(jaw_fields["hinge"].vector(_FARTHEST)), np.array(jaw_fields["glide"].vector(_FARTHEST)), rule)
     names: list[str] = []
+    takes_input: list[bool] = []
     places, point_scale, jaw_share, aliases, with_parts = [], [], [], {}, {}
     for name, entry in top["points"].items():
         fields = entry.fields(required=("role", "scale"), optional=("vertex", "at", "jaw", "paper", "part"))
         if ("vertex" in fields) == ("at" in fields):
             raise entry.fail("a feature point needs either vertex or at")
-        fields["role"].choice(ROLES, "role")
+        role = fields["role"].choice(ROLES, "role")
+        takes_input.append(role == "input" or (role == "jaw" and rule == "vertices"))
         places.append(cage.vertices[index(fields["vertex"])] if "vertex" in fields
                       else np.array(fields["at"].vector(_FARTHEST)))
         point_scale.append(scales[fields["scale"].choice(scales, "scale")])
@@ -116,9 +119,6 @@ def read_face(path: Path) -> FaceData:
     weights, rigid = region_weights(cage.vertices, np.array(places), regions, np.array(top["centre_O"].vector(_FARTHEST)), sheets,
                                     followers)
 
-    jaw_fields = top["jaw"].fields(required=("rule", "hinge", "glide"))
-    jaw = Jaw(np.array(jaw_fields["hinge"].vector(_FARTHEST)), np.array(jaw_fields["glide"].vector(_FARTHEST)),
-              jaw_fields["rule"].choice(("vertices", "points"), "rule"))
     eyes = {k: np.array(e.vector(_FARTHEST)) for k, e in top["eyes"].fields(required=("L", "R")).items()}
     lids, rims, lid_skin = [], [], []
     for side, entry in top["lids"].fields(required=("L", "R")).items():
@@ -165,7 +165,7 @@ def read_face(path: Path) -> FaceData:
         np.array(list(eyes.values())), tuple(rims), tuple(lid_skin), follow,
         np.array(head["pivot"].vector(_FARTHEST)), head_weight,
         top["head_half_height"].number(1e-6) if "head_half_height" in top else float(np.ptp(cage.vertices[:, 1]) / 2),
-        attachments, folds, frozenset(top["optional_points"].texts()) if "optional_points" in top else frozenset())
+        attachments, folds, np.array(takes_input))
 
 
 def _integer(key: str) -> object:

@@ -27,7 +27,7 @@ from facegen.facs.units import Catalogue, read_catalogue, split_code
 from facegen.facs.validate import Entry
 from facegen.facs.yamlfile import read_data
 
-_UNIT_KEYS = tuple(key for key in KEYS if key not in ("units", "turns_with_jaw"))
+_UNIT_KEYS = tuple(key for key in KEYS if key != "units")
 
 
 @dataclass(frozen=True)

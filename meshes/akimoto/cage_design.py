@@ -355,3 +355,30 @@ def mirrored_fold(fold: dict) -> dict:
     """Return a fold on the other side."""
     flip = lambda v: [-v[0], *v[1:]]  # noqa: E731
     return {**fold, "along": [flip(v) for v in fold["along"]], "toward": flip(fold["toward"])}
+
+
+# -- the paper's own points and regions -----------------------------------------------------------------------------
+PAPER_ROLES = {**{f"F{i}": "fixed" for i in range(1, 16)}, **{f"F{i}": "input" for i in (2, 3, 8, 9)},
+               **{f"F{i}": "jaw" for i in (4, 14, 15)}}
+PAPER_HINGE = [0.0, -18.0, -56.0]        # the axis through F12 and F13
+
+
+def paper_regions() -> list[dict]:
+    """Return our reconstruction of regions 1 to 19; 6 is the paper's example, 1, 16 and 17 turn with the jaw."""
+    pairs = [(2, ("nose_base", "lip_upper", "mouth_corner_L"), "mouth_upper", False),
+             (4, ("nose_base", "mouth_corner_L", "nose_wing_L"), "mouth_upper", False),
+             (6, ("lip_lower", "chin", "mouth_corner_L"), "mouth_lower", False),
+             (8, ("nose_wing_L", "mouth_corner_L", "cheek_L"), None, False),
+             (10, ("cheek_L", "mouth_corner_L", "jaw_joint_L"), None, False),
+             (12, ("mouth_corner_L", "chin", "jaw_joint_L"), None, False),
+             (14, ("jaw_joint_L", "jaw_side_L", "neck"), None, False),
+             (16, ("chin", "jaw_side_L", "jaw_joint_L"), None, True)]
+    out = [{"number": 1, "points": ["chin", "jaw_side_L", "jaw_side_R"], "rigid": True}]
+    for number, points, sheet, rigid in pairs:
+        for k in (0, 1):
+            names = [n[:-1] + "R" if k and n.endswith("_L") else n for n in points]
+            out.append({"number": number + k, "points": names[::-1] if k else names,
+                        **({"sheet": sheet} if sheet else {}), **({"rigid": True} if rigid else {})})
+    out.append({"number": 18, "points": ["jaw_side_L", "jaw_side_R", "neck"]})
+    out.append({"number": 19, "points": ["nose_base", "nose_wing_L", "nose_wing_R"]})
+    return out

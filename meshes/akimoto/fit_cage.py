@@ -536,11 +536,32 @@ def write(names, vertices, faces, materials, creases, corners) -> None:
                   for n, v in design.FOLDS.items() for s in ("LR" if n.endswith("_L") else "L")},
     }
     (HERE / "cage_names.txt").write_text("\n".join(names) + "\n")
-    lines = ["# The base face: feature points, regions and rotations. Millimetres, +x subject's left, +y up, +z forward.",
-             "# Vertices are 0-based indices into cage.obj. Written by fit_cage.py; see docs/face.md for the keys."]
+    about = ["# The base face: feature points, regions and rotations. Millimetres, +x subject's left, +y up, +z forward.",
+             "# Vertices are 0-based indices into cage.obj. Written by fit_cage.py; see docs/faces.md for the keys."]
+    write_yaml(HERE / "face.yaml", about, data)
+
+    # The paper's own mode: fifteen points, nineteen regions, the jaw rule of section 3.1.
+    paper = {n: {**p, "role": design.PAPER_ROLES[p["paper"]], "jaw": float(p["paper"] in ("F4", "F14", "F15"))}
+             for n, p in points.items() if "paper" in p}
+    folder = HERE.parent / "akimoto-1986"
+    folder.mkdir(exist_ok=True)
+    parts = [{**p, "file": f"../akimoto/{p['file']}"} for p in data["parts"]]
+    about = ["# Akimoto, Mase and Suenaga 1986, section 3.1: 15 feature points, 19 regions, on the cage of `akimoto`.",
+             "# Their figure 3 is not in the text: the layout is our reconstruction from what the text says.",
+             "# Eyes, lids and head, which the paper only sketches, are those of `akimoto`. Written by fit_cage.py."]
+    write_yaml(folder / "face.yaml", about, {
+        **data, "name": "akimoto-1986", "cage": "../akimoto/cage.obj", "points": paper,
+        "regions": design.paper_regions(), "jaw": {"rule": "points", "hinge": design.PAPER_HINGE, "glide": [0, 0, 0]},
+        "parts": parts, "folds": {}})
+    print(len(points), "feature points", len(regions), "regions")
+
+
+def write_yaml(path: Path, about: list[str], data: dict) -> None:
+    """Write a face's data, one thing a line."""
+    lines = list(about)
     dump = lambda v: yaml.safe_dump(v, default_flow_style=True, width=10**6, sort_keys=False).strip()  # noqa: E731
     for key, value in data.items():
-        if key in ("points", "measures", "scales", "jaw", "eyes", "head", "folds", "lid_follow"):
+        if key in ("points", "measures", "scales", "jaw", "eyes", "head", "folds", "lid_follow") and value:
             lines += [f"{key}:"] + [f"  {k}: {dump(v).removesuffix('...').strip()}" for k, v in value.items()]
         elif key in ("regions", "parts"):
             lines += [f"{key}:"] + [f"- {dump(r)}" for r in value]
@@ -549,8 +570,7 @@ def write(names, vertices, faces, materials, creases, corners) -> None:
                 f"  {s}:", *(f"    {k}: {dump(x)}" for k, x in v.items()))]
         else:
             lines.append(f"{key}: {dump(value).removesuffix('...').strip()}")
-    (HERE / "face.yaml").write_text("\n".join(lines) + "\n")
-    print(len(points), "feature points", len(regions), "regions")
+    path.write_text("\n".join(lines) + "\n")
 
 
 def main() -> None:

@@ -329,6 +329,8 @@ def main() -> None:
         if "lids" in r:
             pair = {k: x for k, x in zip(("upper_L", "lower_L"), r["lids"], strict=True) if x}
             out.append("    lids: {" + ", ".join(f"{k}: {number(x)}" for k, x in pair.items()) + "}")
+        if code in ("26", "27"):
+            out.append("    turns_with_jaw: [lip_lower]")
         for key in ("eyes", "head", "folds"):
             if key in r:
                 out.append(f"    {key}: {{" + ", ".join(f"{k}: {number(x)}" for k, x in r[key].items()) + "}")
