@@ -253,11 +253,11 @@ FEATURE_POINTS: dict[str, tuple[str, str, str, float, str | None]] = {
     "chin_inner_L": ("chin_1", "jaw", "mouth", 1, None),
     "chin_side_L": ("chin_2", "jaw", "mouth", 0.87, None),
     "chin_bottom_L": ("chin_low_1", "jaw", "mouth", 1, None),
-    "jaw_side_L": ("jaw_0", "jaw", "mouth", 0.83, "F14"),
+    "jaw_side_L": ("jaw_0", "jaw", "mouth", 0.83, None),
     "jaw_edge_L": ("jaw_1", "jaw", "mouth", 1, None),
     "jaw_body_L": ("jaw_2", "jaw", "mouth", 0.95, None),
     "jaw_back_L": ("jaw_3", "jaw", "mouth", 0.75, None),
-    "jaw_under_L": ("jaw_4", "jaw", "mouth", 0.92, None),
+    "jaw_under_L": ("jaw_4", "jaw", "mouth", 0.92, "F14"),
     "jaw_angle_L": ("jaw_angle", "jaw", "mouth", 0.42, None),
     "submental_L": ("under_1", "jaw", "mouth", 1, None),
     "throat_L": ("throat_1", "input", "mouth", 0.42, None),
@@ -360,7 +360,6 @@ def mirrored_fold(fold: dict) -> dict:
 # -- the paper's own points and regions -----------------------------------------------------------------------------
 PAPER_ROLES = {**{f"F{i}": "fixed" for i in range(1, 16)}, **{f"F{i}": "input" for i in (2, 3, 8, 9)},
                **{f"F{i}": "jaw" for i in (4, 14, 15)}}
-PAPER_HINGE = [0.0, -18.0, -56.0]        # the axis through F12 and F13
 
 
 def paper_regions() -> list[dict]:
@@ -371,14 +370,14 @@ def paper_regions() -> list[dict]:
              (8, ("nose_wing_L", "mouth_corner_L", "cheek_L"), None, False),
              (10, ("cheek_L", "mouth_corner_L", "jaw_joint_L"), None, False),
              (12, ("mouth_corner_L", "chin", "jaw_joint_L"), None, False),
-             (14, ("jaw_joint_L", "jaw_side_L", "neck"), None, False),
-             (16, ("chin", "jaw_side_L", "jaw_joint_L"), None, True)]
-    out = [{"number": 1, "points": ["chin", "jaw_side_L", "jaw_side_R"], "rigid": True}]
+             (14, ("jaw_joint_L", "jaw_under_L", "neck"), None, False),
+             (16, ("chin", "jaw_under_L", "jaw_joint_L"), None, True)]
+    out = [{"number": 1, "points": ["chin", "jaw_under_L", "jaw_under_R"], "rigid": True}]
     for number, points, sheet, rigid in pairs:
         for k in (0, 1):
             names = [n[:-1] + "R" if k and n.endswith("_L") else n for n in points]
             out.append({"number": number + k, "points": names[::-1] if k else names,
                         **({"sheet": sheet} if sheet else {}), **({"rigid": True} if rigid else {})})
-    out.append({"number": 18, "points": ["jaw_side_L", "jaw_side_R", "neck"]})
+    out.append({"number": 18, "points": ["jaw_under_L", "jaw_under_R", "neck"]})
     out.append({"number": 19, "points": ["nose_base", "nose_wing_L", "nose_wing_R"]})
     return out

@@ -85,6 +85,12 @@ class Measure:
         """Return the largest distance between the lips' seams, mm."""
         return float(np.linalg.norm(vertices[self.seam[0]] - vertices[self.seam[1]], axis=1).max())
 
+    def lip_opening(self, vertices) -> float:
+        """Return how far the upper seam stands above the lower one, mm: lips that slide past each other are shut."""
+        up, low = vertices[self.seam[0]], vertices[self.seam[1]]
+        order = np.argsort(low[:, 0])
+        return float((up[:, 1] - np.interp(up[:, 0], low[order, 0], low[order, 1])).max())
+
     def shows_through(self, vertices, parts, rings, *, turn=0.0, tolerance=0.35) -> int:
         """Count vertices of parts that the skin should hide and does not, seen from the front turned by degrees.
 
