@@ -23,8 +23,9 @@ Array = NDArray[np.float64]
 class Attachment:
     """A part and what carries it; whatever is None does not.
 
-    ``skin`` (n, n_cage): weights of the cage's movement. ``jaw`` (n, 1): share of the jaw's. ``eye``: number of
-    the eye it turns with, about ``centre`` (3,). ``points``: feature points (row, weights (n, 1)) that move it.
+    ``skin`` (n, n_cage): weights of the cage's movement. ``jaw`` (n, 1): share of the jaw's. ``eye``: number
+    of the eye it turns with, about ``centre`` (3,). ``points``: feature points (row, weights (n, 1)) that
+    move it.
     """
 
     mesh: Mesh
@@ -35,12 +36,16 @@ class Attachment:
     points: tuple[tuple[int, Array], ...] = ()
 
     def move(self, moved_cage: Array, controls: Controls, deformer: Deformer) -> Array:
-        """Return the part's vertices (..., n, 3), mm, before the head turns; ``moved_cage`` (..., n_cage, 3)."""
+        """Return the part's vertices (..., n, 3), mm, before the head turns.
+
+        ``moved_cage`` (..., n_cage, 3): the cage's movement.
+        """
         rest = self.mesh.vertices
         batch = moved_cage.shape[:-2]
         out = np.broadcast_to(rest, (*batch, *rest.shape))
         if self.skin is not None:
-            flat = np.moveaxis(moved_cage.reshape(-1, *moved_cage.shape[-2:]), 0, 1).reshape(moved_cage.shape[-2], -1)
+            n_cage = moved_cage.shape[-2]
+            flat = np.moveaxis(moved_cage.reshape(-1, n_cage, 3), 0, 1).reshape(n_cage, -1)
             out = out + np.moveaxis((self.skin @ flat).reshape(len(rest), -1, 3), 1, 0).reshape(out.shape)
         if self.jaw is not None and np.any(controls.jaw):
             out = out + self.jaw * deformer.jaw.movement(rest, controls.jaw)
@@ -57,14 +62,15 @@ class Attachment:
         return np.array(out)
 
 
-def attach(points: Array, surface: Array, faces: NDArray[np.int32], matrix: sparse.csr_array) -> sparse.csr_array:
+def attach(points: Array, surface: Array, faces: NDArray[np.int32],
+           matrix: sparse.csr_array) -> sparse.csr_array:
     """Return the weights (n, n_cage) by which points (n, 3) follow the nearest triangle of a skin surface.
 
     ``surface`` (m, 3) = ``matrix @ cage``. The barycentric weights of the foot point are carried through
     ``matrix``, so a part follows the smooth surface at every level of detail.
     """
     centroids = surface[faces].mean(axis=1)
-    _, near = cKDTree(centroids).query(points, k=6)
+    _, near = cKDTree(centroids).query(points, k=np.arange(1, min(6, len(faces)) + 1))
     a, b, c = (surface[faces[near, i]] for i in range(3))
     e1, e2, d = b - a, c - a, points[:, None] - a
     g11, g12, g22 = ((p * q).sum(-1) for p, q in ((e1, e1), (e1, e2), (e2, e2)))
@@ -76,6 +82,7 @@ def attach(points: Array, surface: Array, faces: NDArray[np.int32], matrix: spar
     foot = np.einsum("nkj,nkji->nki", bary, np.stack([a, b, c], axis=2))
     best = np.linalg.norm(foot - points[:, None], axis=2).argmin(axis=1)
     rows = np.arange(len(points))
-    weights = sparse.csr_array((bary[rows, best].reshape(-1), (np.repeat(rows, 3), faces[near[rows, best]].reshape(-1))),
+    corners = faces[near[rows, best]].reshape(-1)
+    weights = sparse.csr_array((bary[rows, best].reshape(-1), (np.repeat(rows, 3), corners)),
                                shape=(len(points), len(surface)))
     return sparse.csr_array(weights @ matrix)

@@ -16,8 +16,10 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class Fold:
-    """``along`` (k, 3) the valley's curve on the neutral face, mm; ``width`` its half width; ``depth`` below the
-    skin; ``ridge`` height of the bulge beside it, on the side that ``toward`` (3,) points to. All in mm.
+    """A valley and its ridge, in mm.
+
+    ``along`` (k, 3): the valley's curve on the neutral face; ``width``: its half width; ``depth``: below the
+    skin; ``ridge``: height of the bulge beside it, on the side that ``toward`` (3,) points to.
     """
 
     along: Array
@@ -42,7 +44,7 @@ def fold_field(fold: Fold, vertices: Array, normals: Array) -> Array:
     place = (run[nearest] + t[rows, nearest] * length[nearest]) / run[-1]
     fade = np.clip(np.minimum(place, 1.0 - place) / 0.3, 0.0, 1.0)
     fade = fade * fade * (3.0 - 2.0 * fade)
-    side = distance * np.sign(away @ fold.toward)
+    side = np.where(away @ fold.toward < 0, -distance, distance)
     u = side / fold.width
     height = -fold.depth * np.exp(-u * u) + fold.ridge * np.exp(-((u - 2.0) ** 2) / 1.4)
     height *= fade * (np.abs(u) < 6.0) * np.clip(normals[:, 2] * 4.0 + 1.0, 0.0, 1.0)

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from facegen.errors import TableError, nearest
 from facegen.face.attach import Attachment, attach
 from facegen.face.deformer import Array, Deformer, Jaw, Lids, Region, region_weights
 from facegen.face.folds import Fold
@@ -20,11 +20,12 @@ from facegen.fileio.obj import load_obj
 from facegen.geometry.mesh import Mesh
 from facegen.geometry.subdivision import loop_levels
 
-REQUIRED = ("name", "source", "cage", "centre_O", "measures", "scales", "points", "regions", "jaw", "eyes", "lids",
-            "head")
+REQUIRED = ("name", "source", "cage", "centre_O", "measures", "scales", "points", "regions", "jaw", "eyes",
+            "lids", "head")
 OPTIONAL = ("sheets", "followers", "creases", "corners", "parts", "folds", "lid_follow", "head_half_height")
 CARRIERS = ("skull", "skin", "jaw", "eye", "mouth")
 ROLES = ("input", "jaw", "fixed")
+SIDES = ("L", "R")
 _FARTHEST = 1e6     # mm: no face is larger
 
 
@@ -64,21 +65,23 @@ def read_face(path: Path) -> FaceData:
     n = len(cage.vertices)
 
     def index(entry: Entry) -> int:
-        value = entry.number(0, n - 1)
-        if value != int(value):
-            raise entry.wrong(f"a vertex of {top['cage'].text()}, 0..{n - 1}")
-        return int(value)
+        return _whole(entry, n, f"a vertex of {top['cage'].text()}")
 
-    def indices(entry: Entry) -> list[int]:
-        return [index(e) for e in entry.each()]
+    def indices(entry: Entry) -> NDArray[np.int32]:
+        return np.array([index(e) for e in entry.each()], np.int32)
+
+    def place(entry: Entry) -> Array:
+        return np.array(entry.vector(_FARTHEST))
 
     measures = {k: e.number(1e-6) for k, e in top["measures"].items()}
-    scales = {k: np.array([measures[m.choice(measures, "measure")] for m in e.each()])
+    scales = {k: np.array([measures[m.choice(measures, "measure")] for m in _some(e, 3, "three measures")])
               for k, e in top["scales"].items()}
+    if "mouth" not in scales:
+        raise top["scales"].fail("the key 'mouth' is missing: it scales the jaw's movement")
 
     jaw_fields = top["jaw"].fields(required=("rule", "hinge", "glide"))
     rule = jaw_fields["rule"].choice(("vertices", "points"), "rule")
-    jaw = Jaw(np.array(jaw_fields["hinge"].vector(_FARTHEST)), np.array(jaw_fields["glide"].vector(_FARTHEST)), rule)
+    jaw = Jaw(place(jaw_fields["hinge"]), place(jaw_fields["glide"]), rule)
     names: list[str] = []
     takes_input: list[bool] = []
     places, point_scale, jaw_share, aliases, with_parts = [], [], [], {}, {}
@@ -88,102 +91,143 @@ def read_face(path: Path) -> FaceData:
             raise entry.fail("a feature point needs either vertex or at")
         role = fields["role"].choice(ROLES, "role")
         takes_input.append(role == "input" or (role == "jaw" and rule == "vertices"))
-        places.append(cage.vertices[index(fields["vertex"])] if "vertex" in fields
-                      else np.array(fields["at"].vector(_FARTHEST)))
+        places.append(cage.vertices[index(fields["vertex"])] if "vertex" in fields else place(fields["at"]))
         point_scale.append(scales[fields["scale"].choice(scales, "scale")])
         jaw_share.append(fields["jaw"].number(0, 1) if "jaw" in fields else 0.0)
-        if "paper" in fields:
-            aliases[fields["paper"].text()] = len(names)
-        if "part" in fields:
-            with_parts[fields["part"].text()] = len(names)
+        for key, rows in (("paper", aliases), ("part", with_parts)):
+            if key in fields and rows.setdefault(fields[key].text(), len(names)) != len(names):
+                raise fields[key].fail(f"'{fields[key].text()}' is given to two feature points")
         names.append(name)
     at = {name: i for i, name in enumerate(names)}
 
     regions = []
-    for entry in top["regions"].each():
+    sheet_names = dict(top["sheets"].items()) if "sheets" in top else {}
+    for entry in _some(top["regions"], None, "one region or more"):
         fields = entry.fields(required=("points",), optional=("sheet", "rigid", "number"))
         corners = [at[e.choice(at, "feature point")] for e in fields["points"].each()]
         if len(set(corners)) != 3:
             raise entry.fail("a region is bounded by exactly three feature points")
-        regions.append(Region((corners[0], corners[1], corners[2]), fields["rigid"].flag() if "rigid" in fields else False,
-                              fields["sheet"].text() if "sheet" in fields else None))
+        if "number" in fields:          # the paper's, for the reader
+            fields["number"].number()
+        regions.append(Region((corners[0], corners[1], corners[2]),
+                              fields["rigid"].flag() if "rigid" in fields else False,
+                              fields["sheet"].choice(sheet_names, "sheet") if "sheet" in fields else None))
 
     sheets: list[str | None] = [None] * n
-    for name, entry in top["sheets"].items() if "sheets" in top else ():
+    for name, entry in sheet_names.items():
         for i in indices(entry):
+            if sheets[i] not in (None, name):
+                raise entry.fail(f"vertex {i} is already of the sheet '{sheets[i]}'")
             sheets[i] = name
     followers = {}
     for key, entry in top["followers"].items() if "followers" in top else ():
         followers[index(Entry(_integer(key), entry.source, entry.path))] = {
             index(Entry(_integer(k), e.source, e.path)): e.number(0, 1) for k, e in entry.items()}
-    weights, rigid = region_weights(cage.vertices, np.array(places), regions, np.array(top["centre_O"].vector(_FARTHEST)), sheets,
+        if abs(sum(followers[int(key)].values()) - 1.0) > 1e-6:
+            raise entry.wrong("shares that sum to one")
+    weights, rigid = region_weights(cage.vertices, np.array(places), regions, place(top["centre_O"]), sheets,
                                     followers)
 
-    eyes = {k: np.array(e.vector(_FARTHEST)) for k, e in top["eyes"].fields(required=("L", "R")).items()}
+    by_side = {key: top[key].fields(required=SIDES) for key in ("eyes", "lids")}
+    eyes = {side: place(by_side["eyes"][side]) for side in SIDES}
     lids, rims, lid_skin = [], [], []
-    for side, entry in top["lids"].fields(required=("L", "R")).items():
-        fields = entry.fields(required=("columns", "movers", "rims", "skin"))
-        movers = [e.each() for e in fields["movers"].each()]
-        columns = np.array([indices(e) for e in fields["columns"].each()])
+    for side in SIDES:
+        fields = by_side["lids"][side].fields(required=("columns", "movers", "rims", "skin"))
+        columns = np.array([[index(v) for v in _some(e, 2, "two vertices [upper, lower]")]
+                            for e in _some(fields["columns"], None, "one column or more")])
+        movers = [_some(e, 4, "[vertex, column, upper or lower, share]")
+                  for e in _some(fields["movers"], None, "one mover or more")]
         lids.append(Lids(eyes[side], columns,
                          np.array([index(m[0]) for m in movers]),
-                         np.array([int(m[1].number(0, len(columns) - 1)) for m in movers]),
+                         np.array([_whole(m[1], len(columns), "a column of the lid") for m in movers]),
                          np.array([m[2].choice(("upper", "lower"), "lid") == "lower" for m in movers]),
                          np.array([m[3].number(-1, 1) for m in movers])))
-        rims.append(np.array(indices(fields["rims"])))
-        lid_skin.append(np.array(indices(fields["skin"])))
-    deformer = Deformer(cage.vertices, np.array(places), weights, rigid, np.array(jaw_share), jaw, tuple(lids))
+        rims.append(indices(fields["rims"]))
+        lid_skin.append(indices(fields["skin"]))
+    deformer = Deformer(cage.vertices, np.array(places), weights, rigid, np.array(jaw_share), jaw,
+                        tuple(lids))
 
     head = top["head"].fields(required=("pivot", "moves_above", "rests_below"))
-    high, low = np.array(head["moves_above"].vector(_FARTHEST)), np.array(head["rests_below"].vector(_FARTHEST))
+    high, low = place(head["moves_above"]), place(head["rests_below"])
+    if np.array_equal(high, low):
+        raise head["rests_below"].wrong("another place than moves_above")
 
     def head_weight(vertices: Array) -> Array:
         t = np.clip((vertices - low) @ (high - low) / ((high - low) @ (high - low)), 0.0, 1.0)
         return (t * t * (3.0 - 2.0 * t))[:, None]
 
-    creases = np.array([indices(e) for e in top["creases"].each()], np.int32).reshape(-1, 2) \
-        if "creases" in top else np.empty((0, 2), np.int32)
-    corners = np.array(indices(top["corners"]), np.int32) if "corners" in top else np.empty(0, np.int32)
-    attachments = tuple(_part(e, path.parent, cage, creases, corners, eyes, with_parts, np.array(places))
+    creases = np.empty((0, 2), np.int32)
+    if "creases" in top:
+        pairs = [_some(e, 2, "two vertices") for e in top["creases"].each()]
+        creases = np.array([[index(v) for v in pair] for pair in pairs], np.int32).reshape(-1, 2)
+        sides = {frozenset(side) for a, b, c in cage.faces.tolist() for side in ((a, b), (b, c), (c, a))}
+        for edge, entry in zip(creases.tolist(), top["creases"].each(), strict=True):
+            if frozenset(edge) not in sides:
+                raise entry.wrong("two vertices that share an edge of the cage")
+    corners = indices(top["corners"]) if "corners" in top else np.empty(0, np.int32)
+    load = cache(load_obj)      # several parts lie in one file
+    attachments = tuple(_part(e, path.parent, load, cage, creases, corners, eyes, with_parts,
+                              np.array(places))
                         for e in (top["parts"].each() if "parts" in top else ()))
+    parts = [a.mesh.parts[0] for a in attachments]
+    for part, row in with_parts.items():
+        if part not in parts:
+            Entry(part, str(path), f"points.{names[row]}.part").choice(parts, "part")
     folds = {}
     for name, entry in top["folds"].items() if "folds" in top else ():
         fields = entry.fields(required=("along", "width", "depth", "ridge", "toward"))
-        folds[name] = Fold(np.array([e.vector(_FARTHEST) for e in fields["along"].each()]), fields["width"].number(1e-3),
-                           fields["depth"].number(), fields["ridge"].number(), np.array(fields["toward"].vector(_FARTHEST)))
+        along = np.array([place(e) for e in fields["along"].each()])
+        if len(along) < 2 or not np.diff(along, axis=0).any(axis=1).all():
+            raise fields["along"].wrong("two places or more, each other than the one before")
+        folds[name] = Fold(along, fields["width"].number(1e-3), fields["depth"].number(),
+                           fields["ridge"].number(), place(fields["toward"]))
     follow = np.zeros((2, 2))
     if "lid_follow" in top:
         fields = top["lid_follow"].fields(required=("down", "up"))
         for i, entry in enumerate((fields["down"], fields["up"])):
-            pair = [e.number() for e in entry.each()]
-            if len(pair) != 2:
-                raise entry.wrong("two numbers: the upper and the lower lid's travel per degree of gaze")
-            follow[i] = pair
+            expected = "two numbers: the upper and the lower lid's travel per degree of gaze"
+            follow[i] = [e.number() for e in _some(entry, 2, expected)]
     return FaceData(
-        top["name"].text(), top["source"].text(), deformer, cage.faces, cage.materials, cage.face_materials, creases,
-        corners, tuple(names), {**aliases, **at}, np.array(point_scale), scales, tuple(regions),
+        top["name"].text(), top["source"].text(), deformer, cage.faces, cage.materials, cage.face_materials,
+        creases, corners, tuple(names), {**aliases, **at}, np.array(point_scale), scales, tuple(regions),
         np.array(list(eyes.values())), tuple(rims), tuple(lid_skin), follow,
-        np.array(head["pivot"].vector(_FARTHEST)), head_weight,
-        top["head_half_height"].number(1e-6) if "head_half_height" in top else float(np.ptp(cage.vertices[:, 1]) / 2),
+        place(head["pivot"]), head_weight,
+        top["head_half_height"].number(1e-6) if "head_half_height" in top
+        else float(np.ptp(cage.vertices[:, 1]) / 2),
         attachments, folds, np.array(takes_input))
 
 
 def _integer(key: str) -> object:
-    return int(key) if key.isdigit() else key
+    return int(key) if key.isdecimal() else key
 
 
-def _part(entry: Entry, folder: Path, cage: Mesh, creases, corners, eyes: Mapping[str, Array],
-          with_parts: Mapping[str, int], places: Array) -> Attachment:
+def _whole(entry: Entry, count: int, what: str) -> int:
+    """Return a whole number in ``0..count - 1``."""
+    value = entry.number()
+    if not 0 <= value < count or value != int(value):
+        raise entry.wrong(f"{what}, 0..{count - 1}")
+    return int(value)
+
+
+def _some(entry: Entry, count: int | None, expected: str) -> list[Entry]:
+    """Return the entries of a list of ``count`` items; None: of at least one."""
+    items = entry.each()
+    if (not items) if count is None else len(items) != count:
+        raise entry.wrong(expected)
+    return items
+
+
+
+def _part(entry: Entry, folder: Path, load: Callable[[Path], Mesh], cage: Mesh, creases, corners,
+          eyes: Mapping[str, Array], with_parts: Mapping[str, int], places: Array) -> Attachment:
     """Return one part of a file and what carries it."""
     fields = entry.fields(required=("file", "part", "carried_by"), optional=("eye", "fades"))
-    whole = load_obj(folder / fields["file"].text())
-    name = fields["part"].text()
-    if name not in whole.parts:
-        raise fields["part"].fail(f"{fields['file'].text()} has no object {name!r}{nearest(name, whole.parts)}")
+    whole = load(folder / fields["file"].text())
+    name = fields["part"].choice(whole.parts, f"object of {fields['file'].text()}")
     keep = np.flatnonzero(whole.face_parts == whole.parts.index(name))
     used, faces = np.unique(whole.faces[keep], return_inverse=True)
-    mesh = Mesh(whole.vertices[used], faces.reshape(-1, 3), whole.materials, whole.face_materials[keep], (name,),
-                np.zeros(len(keep), np.int32))
+    mesh = Mesh(whole.vertices[used], faces.reshape(-1, 3), whole.materials, whole.face_materials[keep],
+                (name,), np.zeros(len(keep), np.int32))
     carrier = fields["carried_by"].choice(CARRIERS, "carrier")
     points: tuple = ()
     if name in with_parts:      # a feature point of this part: its pull fades backward from it
@@ -197,12 +241,14 @@ def _part(entry: Entry, folder: Path, cage: Mesh, creases, corners, eyes: Mappin
     if carrier == "mouth":      # a lining between the jaws: its share of the jaw's movement grows downward
         if "fades" not in fields:
             raise entry.fail("a part carried by the mouth needs fades: [top, bottom], heights in mm")
-        top, bottom = (e.number() for e in fields["fades"].each())
+        top, bottom = (e.number() for e in _some(fields["fades"], 2, "two heights [top, bottom]"))
+        if top <= bottom:
+            raise fields["fades"].wrong("two heights [top, bottom], the top first")
         t = np.clip((top - mesh.vertices[:, 1]) / (top - bottom), 0.0, 1.0)
         return Attachment(mesh, jaw=(t * t * (3 - 2 * t))[:, None])
     if carrier == "eye":
         if "eye" not in fields:
-            raise TableError(f"{entry.source}: {entry.path}: a part carried by an eye needs eye: L or R")
+            raise entry.fail("a part carried by an eye needs eye: L or R")
         side = fields["eye"].choice(tuple(eyes), "eye")
         return Attachment(mesh, eye=list(eyes).index(side), centre=eyes[side])
     sub = loop_levels(len(cage.vertices), cage.faces, creases, 2, corners=corners)[2]

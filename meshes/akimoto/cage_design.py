@@ -330,10 +330,11 @@ PARTS = [
     {"file": "soft.obj", "part": "hair", "carried_by": "skin"},
 ]
 
-# Corrective folds: the valley's curve, half width, depth, ridge height (mm), the side the ridge lies on.
+# Corrective folds: the valley's curve (dropped onto the surface from the front), half width, depth, ridge height (mm), the side the ridge lies on.
 FOLDS = {
-    "nasolabial_L": {"along": [[17.5, -36.0, 22.0], [21.5, -44.0, 21.0], [26.5, -53.0, 19.0], [31.0, -62.0, 16.5],
-                               [33.5, -71.0, 14.0]], "width": 2.4, "depth": 1.5, "ridge": 1.5, "toward": [1, 0.6, 0]},
+    "nasolabial_L": {"along": [[18.2, -37.0, 22.0], [20.2, -45.0, 20.0], [23.6, -54.0, 17.0], [28.6, -63.5, 12.0],
+                               [32.6, -74.0, 8.0], [34.0, -86.0, 6.0]], "width": 2.6, "depth": 1.5, "ridge": 1.3,
+                     "toward": [1, 0.5, 0]},
     "crows_feet_L": {"along": [[46.5, -2.0, 7.0], [51.0, -3.5, 2.0], [55.5, -6.5, -4.0]], "width": 1.1, "depth": 0.7,
                      "ridge": 0.35, "toward": [0, -1, 0]},
     "under_eye_L": {"along": [[16.0, -9.0, 14.0], [23.0, -13.0, 15.5], [31.0, -14.0, 15.0], [40.0, -11.5, 11.5],

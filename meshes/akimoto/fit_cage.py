@@ -524,6 +524,11 @@ def write(names, vertices, faces, materials, creases, corners) -> None:
                    "movers": movers, "rims": [at[f"lid_rim_{i}_{s}"] for i in range(10)],
                    "skin": [at[f"lid_crease_{i}_{s}"] for i in range(10)]}
     eye = design.EYE_CENTRE.tolist()
+    sub = loop_levels(len(vertices), faces, creases, 2, corners=corners)[2]
+    surface = sub.matrix @ vertices
+    for fold in design.FOLDS.values():
+        fold["along"] = [first_hit(np.array([x, y, 200.0]), np.array([0, 0, -1.0]), surface, sub.faces).round(2).tolist()
+                         for x, y, _ in fold["along"]]
     data = {
         "name": "akimoto", "source": "own work of the facegen authors, MIT; written by meshes/akimoto/fit_cage.py",
         "cage": "cage.obj", "centre_O": list(design.CENTRE_O), "measures": design.MEASURES,

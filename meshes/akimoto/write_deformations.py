@@ -51,7 +51,7 @@ UNITS: dict[str, dict] = {
                        "cheek_inner_L": (0.4, 1.6, 1.2), "nasolabial_L": (1.0, 1.8, 0.6), "mouth_corner_L": (1.0, 1.5, 0),
                        "lip_upper_surround_outer_L": (0.9, 1.6, 0.1), "lip_lower_outer_L": (0.8, 1.1, 0),
                        "lip_upper_outer_L": (0.8, 1.1, 0)}, "reach": 7.0, "folds": {"nasolabial_L": 1.0}},
-    "12": {"fit": {"mouthSmileLeft": 0.95}, "folds": {"nasolabial_L": 0.9, "crows_feet_L": 0.25}},
+    "12": {"fit": {"mouthSmileLeft": 0.95}, "folds": {"nasolabial_L": 0.8, "crows_feet_L": 0.25}},
     "13": {"by_hand": {"mouth_corner_L": (2.0, 5.1, -1.3), "lip_upper_border_side_L": (0.8, -0.6, -0.3),
                        "lip_lower_border_side_L": (1.4, 1.1, -1.2), "lip_upper_border_outer_L": (1.6, 2.0, -0.6),
                        "lip_lower_border_outer_L": (2.0, 3.4, -1.4), "lip_upper_outer_L": (1.7, 3.4, -1.0),
