@@ -90,7 +90,7 @@ def hair(surface, faces) -> Mesh:
         out += [(polygon[0], polygon[i], polygon[i + 1]) for i in range(1, len(polygon) - 1)]
     used, tri = np.unique(np.array(out), return_inverse=True)
     points, lifted, height = (np.array(a)[used] for a in (points, lifted, height))
-    thick = HAIR_THICKNESS * (1.0 - np.exp(-np.maximum(height, 0) / 9.0)) - 0.35 * (height <= 1e-9)
+    thick = np.where(height > 1e-9, HAIR_THICKNESS * (1.0 - np.exp(-(height + 1.5) / 9.0)), -0.4)
     lifted /= np.linalg.norm(lifted, axis=1, keepdims=True)
     return Mesh.of(points + thick[:, None] * lifted, tri.reshape(-1, 3), material="hair", part="hair")
 

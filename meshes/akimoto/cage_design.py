@@ -122,7 +122,10 @@ EAR_FOLD = [(73.5, -7.0, -65.0), (75.5, -2.0, -73.5), (79.0, -6.0, -82.0), (79.0
 EAR_CONCHA = (69.5, -19.0, -71.0)
 
 # Points of the surface that the fit must meet (name without side -> place).
-PINNED: dict[str, tuple[float, float, float]] = {}
+PINNED: dict[str, tuple[float, float, float]] = {
+    "nose_tip": (0.0, -36.0, 41.6), "nose_base": (0.0, -48.1, 31.25), "lip_border_upper_0": (0.0, -57.9, 35.35),
+    "lip_border_lower_0": (0.0, -78.9, 30.1), "chin": (0.0, -94.4, 23.9),
+}
 
 
 # Rings whose edges must be in the mesh, in order (closed rings repeat the first).

@@ -608,9 +608,7 @@ def main() -> None:
             xyz = np.array([design.LIP_X[i], design.LIP_SEAM_Y[i], design.LIP_SEAM_Z[i]])
             for s, sign in (("", 1),) if i == 0 else (("_L", 1), ("_R", -1)):
                 landmarks.append((at[name + s], xyz * [sign, 1, 1]))
-    for n, x in design.PINNED.items():
-        for s, sign in (("", 1),) if n in at else (("_L", 1), ("_R", -1)):
-            landmarks.append((at[n + s], np.array(x) * [sign, 1, 1]))
+    landmarks += [(at[n], np.array(x)) for n, x in design.PINNED.items()]
     c = fit(full_names, full, faces, creases, corners, other, len(names), target, parts, landmarks)
     for i in range(4):      # the lips meet exactly
         a, b = (names.index(f"lip_seam_{part}_{i}" + "_M" * (i == 0)) for part in ("upper", "lower"))
