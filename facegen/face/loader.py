@@ -198,7 +198,7 @@ def read_face(path: Path) -> FaceData:
 
 
 def _integer(key: str) -> object:
-    return int(key) if key.isdecimal() else key
+    return int(key) if key.isdecimal() and len(key) < 10 else key
 
 
 def _whole(entry: Entry, count: int, what: str) -> int:

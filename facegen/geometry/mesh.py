@@ -29,20 +29,26 @@ class Mesh:
     def __post_init__(self) -> None:
         for name, dtype in (("vertices", np.float64), ("faces", np.int32), ("face_materials", np.int32),
                             ("face_parts", np.int32)):
-            array = np.ascontiguousarray(getattr(self, name), dtype=dtype)
+            array = np.array(getattr(self, name), dtype=dtype, order="C")    # a copy: the caller keeps theirs
             array.flags.writeable = False
             object.__setattr__(self, name, array)
         m = len(self.faces)
         if self.vertices.ndim != 2 or self.vertices.shape[1] != 3:
             raise InputError(f"vertices: expected shape (n, 3), got {self.vertices.shape}")
         if self.faces.ndim != 2 or self.faces.shape[1] != 3:
-            raise InputError(f"faces: expected shape (m, 3), got {self.faces.shape}; split polygons into triangles")
+            raise InputError(f"faces: expected shape (m, 3), got {self.faces.shape}; "
+                             "split polygons into triangles")
         if m and (self.faces.min() < 0 or self.faces.max() >= len(self.vertices)):
             raise InputError(f"faces: indices must lie in 0..{len(self.vertices) - 1}, "
                              f"got {self.faces.min()}..{self.faces.max()}")
         if self.face_materials.shape != (m,) or self.face_parts.shape != (m,):
             raise InputError(f"face_materials, face_parts: expected shape ({m},), one entry a triangle, "
                              f"got {self.face_materials.shape} and {self.face_parts.shape}")
+        for name, names in (("materials", self.materials), ("parts", self.parts)):
+            used = getattr(self, f"face_{name}")
+            if m and (used.min() < 0 or used.max() >= len(names)):
+                raise InputError(f"face_{name}: entries must index {name}, 0..{len(names) - 1}, "
+                                 f"got {used.min()}..{used.max()}")
 
     @classmethod
     def of(cls, vertices, faces, *, material: str = "skin", part: str = "skin") -> Mesh:
@@ -69,11 +75,13 @@ def merge(meshes: Sequence[Mesh]) -> Mesh:
     parts = tuple(dict.fromkeys(p for m in meshes for p in m.parts))
     materials = tuple(dict.fromkeys(x for m in meshes for x in m.materials))
     offsets = np.cumsum([0] + [len(m.vertices) for m in meshes])
+    face_materials = [np.array([materials.index(x) for x in m.materials], int)[m.face_materials]
+                      for m in meshes]
     return Mesh(
         np.concatenate([m.vertices for m in meshes]),
         np.concatenate([m.faces + o for m, o in zip(meshes, offsets, strict=False)]),
         materials,
-        np.concatenate([np.array([materials.index(x) for x in m.materials], int)[m.face_materials] for m in meshes]),
+        np.concatenate(face_materials),
         parts,
         np.concatenate([np.array([parts.index(p) for p in m.parts], int)[m.face_parts] for m in meshes]),
     )

@@ -1,8 +1,9 @@
 """Loop subdivision with creases, one sparse matrix a level.
 
-Based on: C. Loop, "Smooth subdivision surfaces based on triangles" (1987), and the crease rules of H. Hoppe et
-al., "Piecewise smooth surface reconstruction" (1994). The positions after a level are linear in the positions
-before it, so a level is a sparse matrix S and a new list of faces: ``fine = S @ coarse``, for any positions.
+Based on: C. Loop, "Smooth subdivision surfaces based on triangles" (1987), and the crease rules of H. Hoppe
+et al., "Piecewise smooth surface reconstruction" (1994). The positions after a level are linear in the
+positions before it, so a level is a sparse matrix S and a new list of faces: ``fine = S @ coarse``, for any
+positions.
 """
 
 from __future__ import annotations
@@ -19,8 +20,8 @@ class Subdivision:
     """One refinement, or several in a row.
 
     ``matrix`` (n_fine, n_coarse) csr, rows sum to one; ``faces`` (m_fine, 3); ``parent_face`` (m_fine,) the
-    coarse triangle each fine one lies on; ``creases`` (k, 2) the fine edges that stay sharp. The first n_coarse
-    fine vertices are the coarse ones, moved.
+    coarse triangle each fine one lies on; ``creases`` (k, 2) the fine edges that stay sharp. The first
+    n_coarse fine vertices are the coarse ones, moved.
     """
 
     matrix: sparse.csr_array
@@ -56,9 +57,9 @@ def loop_once(n_vertices: int, faces: NDArray[np.int32], creases: NDArray[np.int
               corners=()) -> Subdivision:
     """Refine every triangle into four.
 
-    An edge is sharp if it is listed in ``creases`` or borders fewer than two triangles. A vertex on exactly two
-    sharp edges follows the curve rule (3/4, 1/8, 1/8); on three or more, or listed in ``corners``, it stays; else
-    Loop's rule.
+    An edge is sharp if it is listed in ``creases`` or does not border exactly two triangles. A vertex on
+    exactly two sharp edges follows the curve rule (3/4, 1/8, 1/8); on three or more, or listed in
+    ``corners``, it stays; else Loop's rule.
     """
     n, m = n_vertices, len(faces)
     sides = np.sort(faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
@@ -101,6 +102,7 @@ def loop_once(n_vertices: int, faces: NDArray[np.int32], creases: NDArray[np.int
     a, b, c = faces.T
     fine = np.stack([a, ab, ca, b, bc, ab, c, ca, bc, ab, bc, ca], axis=1).reshape(-1, 3)
     sharp_edges, middle = edges[sharp & (border == 2)], new_vertex[sharp & (border == 2)]
-    fine_creases = np.concatenate([np.stack([sharp_edges[:, 0], middle], 1), np.stack([middle, sharp_edges[:, 1]], 1)])
+    fine_creases = np.concatenate([np.stack([sharp_edges[:, 0], middle], 1),
+                                   np.stack([middle, sharp_edges[:, 1]], 1)])
     return Subdivision(matrix, fine.astype(np.int32), np.repeat(np.arange(m, dtype=np.int32), 4),
                        fine_creases.astype(np.int32))

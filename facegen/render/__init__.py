@@ -1,5 +1,19 @@
-"""From vertices to pictures."""
+"""From vertices to pictures. ``facegen.render`` is this package and, called, its one door: `render`."""
+
+import sys
+from types import ModuleType
 
 from facegen.render.render import render
 
 __all__ = ["render"]
+
+
+class _Callable(ModuleType):
+    """A package that can be called: ``facegen.render(face, "happiness")``, however it was imported."""
+
+    def __call__(self, thing, pose=None, **options):
+        """Draw; see `render`."""
+        return render(thing, pose, **options)
+
+
+sys.modules[__name__].__class__ = _Callable

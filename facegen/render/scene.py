@@ -46,12 +46,14 @@ _WET_WRAP = (0.25, 0.12, 0.10)
 
 MATERIALS: Mapping[str, Material] = MappingProxyType({
     "skin": Material((224, 174, 148), 0.085, 18.0, _SKIN_WRAP),
+    "nostril": Material((134, 82, 68), 0.02, 10.0, _SKIN_WRAP),
     "lips": Material((190, 104, 98), 0.12, 34.0, _WET_WRAP),
     "brows": Material((78, 52, 36), 0.02, 10.0, (0.1, 0.1, 0.1)),
     "lashes": Material((62, 38, 30), 0.02, 10.0),
-    "hair": Material((74, 49, 34), 0.10, 14.0, (0.15, 0.15, 0.15)),
+    "hair": Material((74, 49, 34), 0.05, 10.0, (0.15, 0.15, 0.15)),
     "sclera": Material((230, 225, 220), 0.25, 300.0, (0.35, 0.30, 0.28), 0.5, 0.25),
     "iris": Material((98, 72, 48), 0.25, 300.0, (0.3, 0.3, 0.3), 0.9, 0.25),
+    "limbus": Material((60, 44, 32), 0.25, 300.0, (0.3, 0.3, 0.3), 0.9, 0.25),
     "pupil": Material((16, 12, 11), 0.25, 300.0, (0.0, 0.0, 0.0), 0.9),
     "teeth": Material((242, 231, 213), 0.15, 60.0, (0.25, 0.2, 0.15), lift=0.72),
     "gums": Material((176, 92, 88), 0.12, 40.0, _WET_WRAP, lift=0.3),

@@ -19,7 +19,7 @@ from facegen.geometry.subdivision import loop_levels
 HERE = Path(__file__).resolve().parent
 
 # Middle line of the left brow seen from the front (x, y), and its half height there, mm.
-BROW = [(10.6, 12.6, 1.4), (13.5, 13.9, 3.0), (20.0, 15.7, 3.4), (27.0, 17.2, 3.2), (34.0, 18.0, 2.7), (40.5, 17.2, 2.1),
+BROW = [(10.2, 12.6, 0.7), (12.0, 13.2, 2.1), (14.6, 14.2, 3.0), (20.0, 15.7, 3.4), (27.0, 17.2, 3.2), (34.0, 18.0, 2.7), (40.5, 17.2, 2.1),
         (46.5, 14.7, 1.4), (51.5, 11.2, 0.5)]
 
 # Hairline: angle about the vertical through (0, *, -70), degrees from the front -> height, mm.
@@ -38,7 +38,7 @@ def brows(surface, faces) -> Mesh:
         line[1:-1] = (line[:-2] + 2 * line[1:-1] + line[2:]) / 4
     along = np.gradient(line[:, :2], axis=0)
     across = np.column_stack([-along[:, 1], along[:, 0]]) / np.linalg.norm(along, axis=1, keepdims=True)
-    rows, lift = np.array([-1.0, -0.5, 0.0, 0.5, 1.0]), np.array([-0.25, 0.55, 0.9, 0.55, -0.25])
+    rows, lift = np.array([-1.0, -0.5, 0.0, 0.5, 1.0]), np.array([-0.2, 0.4, 0.6, 0.4, -0.2])
     points = []
     for (x, y, half), a in zip(line, across, strict=True):
         for r, up in zip(rows, lift, strict=True):

@@ -26,7 +26,7 @@ def p(x, y, z):
 
 
 # Eye, ring of ten: inner corner, four along the upper lid, outer corner, four back along the lower lid.
-LID_MARGIN = [(16.6, -3.4, 11.6), (20.7, .3, 14.2), (26.2, 2.3, 15.7), (32.0, 2.8, 15.5), (37.6, 1.6, 13.1),
+LID_MARGIN = [(16.6, -3.4, 11.6), (20.7, .0, 14.3), (26.2, 1.8, 15.8), (32.0, 2.2, 15.6), (37.6, 1.1, 13.2),
               (42.0, -1.1, 8.9), (37.6, -4.0, 11.6), (32.0, -5.1, 14.2), (26.2, -5.2, 14.6), (20.7, -4.6, 13.7)]
 LID_RIM = {0: (20.6, -2.6, 10.2), 5: (38.8, -1.3, 9.8)}      # the corners' floor dips into the eyeball
 LID_CREASE = [(13.6, -3.6), (18.2, 3.6), (24.8, 6.6), (33.2, 6.9), (41.0, 4.4), (46.0, -1.6), (40.8, -7.6),
@@ -38,8 +38,8 @@ ORBIT = [(10.8, -3.6), (15.2, 9.4), (24.2, 13.0), (35.0, 13.0), (45.0, 8.6), (51
 LIP_X = [0.0, 5.6, 11.6, 17.4, 22.4]
 LIP_SEAM_Y = [-66.9, -66.6, -66.6, -66.9, -67.4]
 LIP_SEAM_Z = [28.8, 28.4, 26.6, 24.0, 20.6]
-LIP_BORDER_UPPER = [(0, -58.6), (5.2, -57.6), (11.4, -59.2), (18.0, -62.9)]
-LIP_BORDER_LOWER = [(0, -78.9), (6.0, -78.6), (12.4, -76.6), (18.4, -72.6)]
+LIP_BORDER_UPPER = [(0, -59.9), (5.4, -59.2), (11.4, -60.4), (17.8, -63.6)]
+LIP_BORDER_LOWER = [(0, -77.2), (6.0, -76.9), (12.3, -75.2), (18.2, -71.7)]
 LIP_BELLY_LOWER = [(0, -72.6), (5.8, -72.5), (12.0, -71.6), (18.0, -69.8)]
 SURROUND_UPPER = [(0, -52.6), (6.0, -51.8), (13.6, -53.0), (21.8, -56.6)]
 SURROUND_LOWER = [(0, -84.6), (7.6, -84.6), (15.4, -83.0), (23.2, -78.2)]
@@ -63,7 +63,7 @@ def points() -> dict[str, tuple]:
         out[f"surround_upper_{i}{tag}"] = f(*SURROUND_UPPER[i])
         out[f"surround_lower_{i}{tag}"] = f(*SURROUND_LOWER[i])
     out["lip_seam_4"] = f(LIP_X[4], LIP_SEAM_Y[4])
-    out["lip_border_4"] = f(24.6, -67.6)
+    out["lip_border_4"] = f(23.7, -67.5)
     out["surround_4"] = f(29.0, -67.4)
 
     out |= {  # nose
@@ -123,8 +123,8 @@ EAR_CONCHA = (69.5, -19.0, -71.0)
 
 # Points of the surface that the fit must meet (name without side -> place).
 PINNED: dict[str, tuple[float, float, float]] = {
-    "nose_tip": (0.0, -36.0, 41.6), "nose_base": (0.0, -48.1, 31.25), "lip_border_upper_0": (0.0, -57.9, 35.35),
-    "lip_border_lower_0": (0.0, -78.9, 30.1), "chin": (0.0, -94.4, 23.9),
+    "nose_tip": (0.0, -36.0, 41.6), "nose_base": (0.0, -48.1, 31.25), "chin": (0.0, -94.4, 23.9),
+    "lip_border_upper_0": (0.0, -59.6, 35.1),
 }
 
 
@@ -336,7 +336,7 @@ PARTS = [
 # Corrective folds: the valley's curve (dropped onto the surface from the front), half width, depth, ridge height (mm), the side the ridge lies on.
 FOLDS = {
     "nasolabial_L": {"along": [[18.2, -37.0, 22.0], [20.2, -45.0, 20.0], [23.6, -54.0, 17.0], [28.6, -63.5, 12.0],
-                               [32.6, -74.0, 8.0], [34.0, -86.0, 6.0]], "width": 2.6, "depth": 1.5, "ridge": 1.3,
+                               [32.6, -74.0, 8.0], [34.0, -86.0, 6.0]], "width": 2.8, "depth": 1.15, "ridge": 1.2,
                      "toward": [1, 0.5, 0]},
     "crows_feet_L": {"along": [[46.5, -2.0, 7.0], [51.0, -3.5, 2.0], [55.5, -6.5, -4.0]], "width": 1.1, "depth": 0.7,
                      "ridge": 0.35, "toward": [0, -1, 0]},

@@ -247,7 +247,7 @@ def strips(names, positions, tri, index):
         rim.append(add(f"lid_rim_{i}", design.LID_RIM.get(i, eye + 13.4 * d / np.linalg.norm(d))))
     for i in range(10):
         j = (i + 1) % 10
-        quad(margin[i], margin[j], rim[j], rim[i], "lips" if i in (0, 9) else "lashes" if i < 5 else "skin")
+        quad(margin[i], margin[j], rim[j], rim[i], "lips" if i in (0, 9) else "lashes" if i in (1, 2, 3) else "skin")
 
     def lip_ring(name, offsets):
         """The seam's ring moved by the offsets: upper middle .. corner .. lower middle."""
@@ -272,10 +272,10 @@ def strips(names, positions, tri, index):
         materials.extend(["mouth"] * 3)
 
     nostril = [index[f"nostril_{i}"] for i in range(4)]
-    apex = add("nostril_in", np.mean([positions[i] for i in nostril], axis=0) + [0, 7.0, -2.0])
+    apex = add("nostril_in", np.mean([positions[i] for i in nostril], axis=0) + [0, 11.0, -4.0])
     for i in range(4):
         tri.append((nostril[i], nostril[(i + 1) % 4], apex))
-        materials.append("skin")
+        materials.append("nostril")
 
     root = [index[f"ear_root_{i}"] for i in range(8)]
     rim = [add(f"ear_rim_{i}", xyz) for i, xyz in enumerate(design.EAR_RIM)]
