@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 from fit_cage import first_hit
+from scipy.interpolate import PchipInterpolator
 
 from facegen.facs.yamlfile import read_data
 from facegen.fileio.obj import format_obj, load_obj
@@ -23,7 +24,7 @@ BROW = [(10.2, 12.6, 0.7), (12.0, 13.2, 2.1), (14.6, 14.2, 3.0), (20.0, 15.7, 3.
         (46.5, 14.7, 1.4), (51.5, 11.2, 0.5)]
 
 # Hairline: angle about the vertical through (0, *, -70), degrees from the front -> height, mm.
-HAIRLINE = [(0, 66), (12, 67), (28, 62), (40, 50), (47, 36), (56, 26), (64, 12), (69, -4), (74, -6), (79, 9), (90, 14),
+HAIRLINE = [(0, 66), (12, 67), (28, 62), (40, 50), (47, 36), (56, 26), (64, 15), (70, 4), (75, 3), (82, 12), (90, 14),
             (101, 8), (107, -14), (118, -40), (140, -56), (180, -62)]
 HAIR_THICKNESS = 7.0
 
@@ -38,7 +39,7 @@ def brows(surface, faces) -> Mesh:
         line[1:-1] = (line[:-2] + 2 * line[1:-1] + line[2:]) / 4
     along = np.gradient(line[:, :2], axis=0)
     across = np.column_stack([-along[:, 1], along[:, 0]]) / np.linalg.norm(along, axis=1, keepdims=True)
-    rows, lift = np.array([-1.0, -0.5, 0.0, 0.5, 1.0]), np.array([-0.2, 0.4, 0.6, 0.4, -0.2])
+    rows, lift = np.array([-1.0, -0.5, 0.0, 0.5, 1.0]), np.array([0.12, 0.45, 0.6, 0.45, 0.12])
     points = []
     for (x, y, half), a in zip(line, across, strict=True):
         for r, up in zip(rows, lift, strict=True):
@@ -60,7 +61,7 @@ def hair(surface, faces) -> Mesh:
     """The scalp above the hairline, cut exactly along it and lifted."""
     angles, heights = np.array(HAIRLINE, float).T
     phi = np.degrees(np.arctan2(np.abs(surface[:, 0]), surface[:, 2] + 70.0))
-    h = surface[:, 1] - np.interp(phi, angles, heights)
+    h = surface[:, 1] - PchipInterpolator(angles, heights)(phi)
     h[np.abs(surface[:, 0]) > 74] = -50.0       # not the ears
     normals = vertex_normals(surface, faces)
     points, lifted, made, out = list(surface), list(normals), {}, []
@@ -90,7 +91,7 @@ def hair(surface, faces) -> Mesh:
         out += [(polygon[0], polygon[i], polygon[i + 1]) for i in range(1, len(polygon) - 1)]
     used, tri = np.unique(np.array(out), return_inverse=True)
     points, lifted, height = (np.array(a)[used] for a in (points, lifted, height))
-    thick = np.where(height > 1e-9, HAIR_THICKNESS * (1.0 - np.exp(-(height + 1.5) / 9.0)), -0.4)
+    thick = np.where(height > 1e-9, HAIR_THICKNESS * (1.0 - np.exp(-(height + 1.5) / 9.0)), 0.25)
     lifted /= np.linalg.norm(lifted, axis=1, keepdims=True)
     return Mesh.of(points + thick[:, None] * lifted, tri.reshape(-1, 3), material="hair", part="hair")
 
