@@ -1,3 +1,89 @@
-"""facegen: facial expressions from a name or a FACS script."""
+"""facegen: facial expressions from a name or a FACS script.
+
+::
+
+    import facegen
+
+    face = facegen.load_face()
+    vertices = face.pose("happiness")                        # (n, 3) millimetres
+    pixels = facegen.render(face, "6C+12D", size=512)        # (512, 512, 4) uint8
+    facegen.save_image(pixels, "smile.png")
+
+Left and right are the subject's own. +x is the subject's left, +y up, +z forward.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from facegen.errors import FacegenError, FileError, InputError, NotationError, TableError
+    from facegen.face.face import Controls, Face, face_names, load_face
+    from facegen.facs.deformation import Deformation, load_deformation
+    from facegen.facs.expression_table import people
+    from facegen.facs.expressions import Resolution, presets, resolve
+    from facegen.facs.notation import canonical, parse
+    from facegen.facs.tables import load_expressions, load_person, load_units
+    from facegen.fileio.images import contact_sheet, save_image
+    from facegen.geometry.mesh import Mesh
+    from facegen.render import render
 
 __version__ = "0.1.0"
+
+__all__ = [
+    "Controls",
+    "Deformation",
+    "Face",
+    "FacegenError",
+    "FileError",
+    "InputError",
+    "Mesh",
+    "NotationError",
+    "Resolution",
+    "TableError",
+    "canonical",
+    "contact_sheet",
+    "face_names",
+    "load_deformation",
+    "load_expressions",
+    "load_face",
+    "load_person",
+    "load_units",
+    "parse",
+    "people",
+    "presets",
+    "render",
+    "resolve",
+    "save_image",
+]
+
+# Where each name lives. Read on first use (PEP 562), so that `import facegen` costs nothing.
+_HOMES = {
+    "facegen.errors": ("FacegenError", "FileError", "InputError", "NotationError", "TableError"),
+    "facegen.face.face": ("Controls", "Face", "face_names", "load_face"),
+    "facegen.facs.deformation": ("Deformation", "load_deformation"),
+    "facegen.facs.expression_table": ("people",),
+    "facegen.facs.expressions": ("Resolution", "presets", "resolve"),
+    "facegen.facs.notation": ("canonical", "parse"),
+    "facegen.facs.tables": ("load_expressions", "load_person", "load_units"),
+    "facegen.fileio.images": ("contact_sheet", "save_image"),
+    "facegen.geometry.mesh": ("Mesh",),
+    "facegen": ("render",),                 # the package itself: calling it draws
+}
+_HOME = {name: module for module, names in _HOMES.items() for name in names}
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOME:
+        raise AttributeError(f"module 'facegen' has no attribute {name!r}")
+    from importlib import import_module
+
+    if _HOME[name] == __name__:
+        return import_module(f"{__name__}.{name}")
+    value = getattr(import_module(_HOME[name]), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

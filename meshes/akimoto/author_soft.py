@@ -121,8 +121,7 @@ def main() -> None:
     cage = load_obj(HERE / "cage.obj")
     data = read_data(HERE / "face.yaml")
     sub = loop_levels(len(cage.vertices), cage.faces, np.array(data["creases"]), 3, corners=data["corners"])
-    n = sub[2].matrix.shape[0]
-    surface, faces = (sub[3].matrix @ cage.vertices)[:n], sub[2].faces
+    surface, faces = sub[3].matrix @ cage.vertices, sub[3].faces
     whole = merge([brows(surface, faces), hair(surface, faces), mouth()])
     (HERE / "soft.obj").write_text(format_obj(whole, comment=(
         "Brows, hair cap and mouth lining of facegen's base face: own work of the facegen authors, MIT licence.\n"

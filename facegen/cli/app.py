@@ -1,0 +1,79 @@
+"""The commands together, and what happens when one fails: a line on stderr and an exit code, no traceback."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Sequence
+from typing import Annotated
+
+import typer
+
+from facegen import __version__
+from facegen.cli import explain, figures, gallery, listing, picture
+from facegen.errors import FacegenError
+
+DONE, STOPPED, WRONG = 0, 1, 2
+
+# The errors of a command line (an unknown option, a missing argument): typer exports only their child.
+_CommandLineError = typer.BadParameter.__mro__[2]
+
+app = typer.Typer(name="facegen", add_completion=False, rich_markup_mode=None, pretty_exceptions_enable=False,
+                  pretty_exceptions_show_locals=False)
+app.command("render")(picture.render)
+app.add_typer(listing.app, name="list")
+app.command("explain")(explain.explain)
+app.command("gallery")(gallery.gallery)
+app.command("figures")(figures.figures)
+
+
+def _version(asked: bool) -> None:
+    if asked:
+        typer.echo(f"facegen {__version__}")
+        raise typer.Exit
+
+
+@app.callback(invoke_without_command=True)
+def facegen(context: typer.Context,
+            version: Annotated[bool, typer.Option("--version", callback=_version, is_eager=True,
+                                                  help="Print the version and stop.")] = False) -> None:
+    """Pictures of facial expressions from a name or a FACS script.
+
+    Left and right are always the subject's own: L12 lifts the left corner of the subject's mouth, which a
+    picture from the front shows on the right.
+    """
+    if context.invoked_subcommand is None:
+        typer.echo(context.get_help(), err=True)
+        raise typer.Exit(WRONG)
+
+
+def run(argv: Sequence[str] | None = None) -> int:
+    """Run one command line (default: the process's own) and return the exit code."""
+    for stream in (sys.stdout, sys.stderr):        # a name that a narrow console cannot show is no failure
+        if hasattr(stream, "reconfigure"):
+            stream.reconfigure(errors="replace")
+    try:
+        code = app(args=None if argv is None else list(argv), prog_name="facegen", standalone_mode=False)
+        sys.stdout.flush()
+        return code if isinstance(code, int) else DONE
+    except FacegenError as error:
+        return _say(str(error), WRONG)
+    except _CommandLineError as error:
+        context = getattr(error, "ctx", None)
+        hint = f" ({context.command_path} --help explains)" if context else ""
+        return _say(f"{error.format_message().rstrip('.')}{hint}", WRONG)
+    except (typer.Abort, KeyboardInterrupt):
+        return _say("stopped", STOPPED)
+    except BrokenPipeError:                        # `facegen list units | head`
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return STOPPED
+    except Exception as error:
+        if os.environ.get("FACEGEN_DEBUG"):
+            raise
+        return _say(f"a fault of facegen's own, please report it: {type(error).__name__}: {error} "
+                    "(FACEGEN_DEBUG=1 shows where)", STOPPED)
+
+
+def _say(message: str, code: int) -> int:
+    print(f"facegen: {message}", file=sys.stderr)
+    return code
