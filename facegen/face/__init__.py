@@ -1,0 +1,1 @@
+"""Parametric faces: a cage moved by feature points, its smooth surface, and the parts that ride on it."""

@@ -140,7 +140,8 @@ class Lids:
         span = [q[..., 1] - q[..., 0] for q in (x, angle, radius)]            # upper margin -> lower margin
         vx, vangle, vradius = self._cylinder(cage[..., self.vertices, :])
         travel = np.where(self.lower, -lower[..., None], upper[..., None]) * self.share
-        vx, vangle, vradius = (q + travel * s[..., self.column] for q, s in zip((vx, vangle, vradius), span, strict=True))
+        places = zip((vx, vangle, vradius), span, strict=True)
+        vx, vangle, vradius = (place + travel * way[..., self.column] for place, way in places)
         cage[..., self.vertices, 0] = vx + self.centre[0]
         cage[..., self.vertices, 1] = self.centre[1] + vradius * np.sin(vangle)
         cage[..., self.vertices, 2] = self.centre[2] + vradius * np.cos(vangle)

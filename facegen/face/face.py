@@ -133,8 +133,8 @@ class Face:
             if row is None:
                 continue
             vectors[row] += np.asarray(vector, float) * scale[row]
-        jaw = deformation.jaw
-        jaw_state = np.array([jaw.get("open", 0.0), jaw.get("side", 0.0) * mouth[0], jaw.get("forward", 0.0) * mouth[2]])
+        open_side_forward = np.array([deformation.jaw.get(k, 0.0) for k in ("open", "side", "forward")])
+        jaw_state = open_side_forward * [1.0, mouth[0], mouth[2]]
         for name in deformation.with_jaw:
             row = self._point(name, strict)
             if row is None:
@@ -254,8 +254,8 @@ class Face:
         faces = d.faces if detail == 0 else subs[detail - 1].faces
         neutral = matrix @ self.deformer.neutral
         lids = []
-        for lid, centre, inner in zip(self.deformer.lids, d.eye_centres, d.lid_rims, strict=True):
-            carried = np.unique(np.concatenate([lid.vertices, d.lid_skin[len(lids)]]))
+        for lid, skin_of_lid, inner in zip(self.deformer.lids, d.lid_skin, d.lid_rims, strict=True):
+            carried = np.unique(np.concatenate([lid.vertices, skin_of_lid]))
             touched = np.asarray(abs(matrix[:, carried]).sum(axis=1)).reshape(-1) > 1e-9
             inside = np.asarray(abs(matrix[:, inner]).sum(axis=1)).reshape(-1) > 1e-9
             # the margin itself (a crease) does not depend on the rim behind it: it stays in

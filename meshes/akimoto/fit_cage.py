@@ -12,6 +12,7 @@ The fit alternates closest points on the target and linear least squares on the 
 from __future__ import annotations
 
 import argparse
+from itertools import pairwise
 from pathlib import Path
 
 import cage_design as design
@@ -173,7 +174,7 @@ def build(target, target_faces):
         positions.append(hit * [0 if name.endswith("_M") else 1, 1, 1])
     positions = np.array(positions, float)
     index = {n: i for i, n in enumerate(names)}
-    edges = [(index[a], index[b]) for ring in design.rings() for a, b in zip(ring, ring[1:], strict=False)]
+    edges = [(index[a], index[b]) for ring in design.rings() for a, b in pairwise(ring)]
     flat = stereographic(positions)
     middle = [i for i, n in enumerate(names) if n.endswith("_M")]
     flat[middle, 0] = -1e-4 * np.arange(len(middle)) * 0
@@ -272,7 +273,7 @@ def strips(names, positions, tri, index):
         materials.extend(["mouth"] * 3)
 
     nostril = [index[f"nostril_{i}"] for i in range(4)]
-    apex = add("nostril_in", np.mean([positions[i] for i in nostril], axis=0) + [0, 11.0, -4.0])
+    apex = add("nostril_in", np.mean([positions[i] for i in nostril], axis=0) + np.array([0, 11.0, -4.0]))
     for i in range(4):
         tri.append((nostril[i], nostril[(i + 1) % 4], apex))
         materials.append("nostril")
@@ -479,7 +480,7 @@ def write(names, vertices, faces, materials, creases, corners) -> None:
     flat = stereographic(xyz)
     where = {n: i for i, n in enumerate(left)}
     rings = design.point_rings()
-    edges = [(where[a], where[b]) for ring in rings for a, b in zip(ring, ring[1:], strict=False)]
+    edges = [(where[a], where[b]) for ring in rings for a, b in pairwise(ring)]
     tri = triangulate(flat, edges)
     holes = [[where[n] for n in rings[0][:-1]], [where[n] for n in rings[1] + rings[2][-2::-1]]]
 
@@ -597,7 +598,7 @@ def main() -> None:
         loops.append([f"lid_margin_{i % 10}_{s}" for i in range(11)])
         for part in ("upper", "lower"):
             loops.append([f"lip_seam_{part}_0", *(f"lip_seam_{part}_{i}_{s}" for i in (1, 2, 3)), f"lip_seam_4_{s}"])
-    creases = np.array([(at[a], at[b]) for loop in loops for a, b in zip(loop, loop[1:], strict=False)])
+    creases = np.array([(at[a], at[b]) for loop in loops for a, b in pairwise(loop)])
     corners = np.array([at[f"{n}_{s}"] for s in "LR" for n in ("lid_margin_0", "lid_margin_5", "lip_seam_4")])
     landmarks = []
     for i, (x, y, z) in enumerate(design.LID_MARGIN):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 
@@ -68,7 +69,7 @@ class Measure:
                 ends = cols[vals > 0.3]
                 middle[frozenset(ends.tolist())] = r
             out = [chain[0]]
-            for a, b in zip(chain, chain[1:], strict=False):
+            for a, b in pairwise(chain):
                 out += [middle[frozenset((a, b))], b]
             chain = out
         return np.array(chain)
@@ -105,7 +106,8 @@ class Measure:
             p = v[mesh.part_vertices(part)]
             lo, hi = p[:, :2].min(0) - 1, p[:, :2].max(0) + 1
             tri = v[skin]
-            near = ((tri[..., :2].max(1) > lo) & (tri[..., :2].min(1) < hi)).all(1) & (tri[..., 2].max(1) > p[:, 2].min())
+            beside = ((tri[..., :2].max(1) > lo) & (tri[..., :2].min(1) < hi)).all(1)
+            near = beside & (tri[..., 2].max(1) > p[:, 2].min())
             depth = _depth_at(p[:, :2], tri[near])
             seen = p[:, 2] > depth + 0.02
             inside = np.zeros(len(p), bool)
@@ -142,7 +144,8 @@ def _in_polygon(points, ring, tolerance):
     a, b = ring, np.roll(ring, -1, axis=0)
     x, y = points[:, 0, None], points[:, 1, None]
     with np.errstate(divide="ignore", invalid="ignore"):
-        hit = ((a[:, 1] > y) != (b[:, 1] > y)) & (x < (b[:, 0] - a[:, 0]) * (y - a[:, 1]) / (b[:, 1] - a[:, 1]) + a[:, 0])
+        crossing = (b[:, 0] - a[:, 0]) * (y - a[:, 1]) / (b[:, 1] - a[:, 1]) + a[:, 0]
+        hit = ((a[:, 1] > y) != (b[:, 1] > y)) & (x < crossing)
     e = b - a
     t = np.clip(((x - a[:, 0]) * e[:, 0] + (y - a[:, 1]) * e[:, 1]) / np.maximum((e**2).sum(1), 1e-12), 0, 1)
     distance = np.hypot(x - a[:, 0] - t * e[:, 0], y - a[:, 1] - t * e[:, 1]).min(axis=1)

@@ -45,8 +45,9 @@ def test_the_neutral_is_symmetric(face):
         assert cKDTree(other).query(v * [-1, 1, 1])[0].max() < 0.02, part
 
 
-@pytest.mark.parametrize("left, right", [("L12E", "R12E"), ("L2E+L4C", "R2E+R4C"), ("L46E", "R46E"), ("L30E", "R30E"),
-                                         ("61E", "62E"), ("L14C+R12A", "R14C+L12A")])
+@pytest.mark.parametrize(("left", "right"), [
+    ("L12E", "R12E"), ("L2E+L4C", "R2E+R4C"), ("L46E", "R46E"), ("L30E", "R30E"), ("61E", "62E"),
+    ("L14C+R12A", "R14C+L12A")])
 def test_mirrored_units_mirror_the_face(face, left, right):
     from scipy.spatial import cKDTree
 

@@ -45,12 +45,12 @@ def test_the_ridge_stands_on_the_side_it_points_to():
 @pytest.mark.parametrize("fold", [STRAIGHT, BENT], ids=["straight", "bent"])
 def test_nothing_moves_far_away_or_at_the_ends(fold):
     h = height(fold)
-    t = np.linspace(0, 1, 200)
+    t = np.linspace(0, 1, 80)
     pairs = zip(fold.along[:-1], fold.along[1:], strict=True)
     curve = np.concatenate([a + t[:, None] * (b - a) for a, b in pairs])
     away = np.linalg.norm(PLANE[:, None] - curve, axis=2).min(axis=1)
     assert h[away <= fold.width].min() < -0.6
-    assert np.abs(h[away > 6.1 * fold.width]).max() == 0
+    assert np.abs(h[away > 6.2 * fold.width]).max() == 0
     ends = fold_field(fold, fold.along[[0, -1]], UP[:2])
     np.testing.assert_allclose(ends, 0, atol=1e-15)
     beyond = (PLANE - fold.along[-1]) @ (fold.along[-1] - fold.along[-2]) > 0

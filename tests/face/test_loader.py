@@ -1,12 +1,14 @@
 import copy
 import json
 import shutil
+from functools import cache
 
 import numpy as np
 import pytest
 
 from facegen.data import meshes_dir
 from facegen.errors import FileError, InputError, TableError
+from facegen.face import loader
 from facegen.face.face import face_names, load_face
 from facegen.face.loader import read_face
 from facegen.facs.yamlfile import read_data
@@ -47,9 +49,14 @@ def altered(path, value):
     return data
 
 
+read_mesh = cache(loader.load_obj)
+
+
 @pytest.fixture
-def read(tmp_path):
+def read(tmp_path, monkeypatch):
     """A function that writes data as a ``face.yaml`` (JSON is YAML) and reads it as a face."""
+    monkeypatch.setattr(loader, "load_obj", read_mesh)      # the meshes stay the same: read them once
+
     def read(data):
         path = tmp_path / "face.yaml"
         path.write_text(data if isinstance(data, str) else json.dumps(data))

@@ -43,8 +43,8 @@ def test_units_of_the_upper_face_leave_the_mouth_alone(face, unit):
     assert moved[mouth].max() < (2.5 if unit == "6" else 1.0)      # a raised cheek carries the lip's corner a little
 
 
-@pytest.mark.parametrize("unit", ["11", "12", "13", "14", "15", "16", "17", "18", "20", "22", "23", "24", "25", "26", "27",
-                                  "28", "29", "L30", "32", "33", "34", "35"])
+@pytest.mark.parametrize("unit", ["11", "12", "13", "14", "15", "16", "17", "18", "20", "22", "23", "24", "25", "26",
+                                  "27", "28", "29", "L30", "32", "33", "34", "35"])
 def test_units_of_the_lower_face_leave_the_forehead_alone(face, unit):
     at, moved = skin_moves(face, f"{unit}E")
     assert moved.max() > 1.0
@@ -59,7 +59,7 @@ def test_a_one_sided_unit_moves_one_side(face, unit):
     assert (right**2).sum() < (0.2 if unit == "16" else 0.12) * (left**2).sum()
 
 
-@pytest.mark.parametrize("unit", [u for u in load_units().catalogue.units])
+@pytest.mark.parametrize("unit", list(load_units().catalogue.units))
 def test_every_unit_shows(face, unit):
     code = f"L{unit}E" if load_units().catalogue.units[unit].sides == "direction" else f"{unit}E"
     mesh = face.mesh()

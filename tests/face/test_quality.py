@@ -67,7 +67,7 @@ def test_lips_stay_sealed_unless_a_unit_parts_them(face, measure, unit):
         assert gap > 1.0
 
 
-@pytest.mark.parametrize("name", [n for n in EXPRESSIONS])
+@pytest.mark.parametrize("name", EXPRESSIONS)
 def test_sealed_expressions_stay_sealed(face, measure, name):
     found = face.resolve(name)
     if keeps_lips_sealed(found.units):
