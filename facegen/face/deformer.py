@@ -60,8 +60,12 @@ def region_weights(vertices: Array, points: Array, regions: Sequence[Region], ce
     total = shares.sum(axis=2)
     front = total > 1e-9
     shares = shares / np.where(front, total, 1.0)[..., None]
-    clamped = np.maximum(shares, 0.0)
-    clamped /= np.maximum(clamped.sum(axis=2, keepdims=True), 1e-12)
+    # A region behind O has no foot on the ray: the nearest of its corners, by angle, stands for it.
+    units = rays / np.maximum(np.linalg.norm(rays, axis=1, keepdims=True), 1e-12)
+    toward = np.stack([corner / np.linalg.norm(corner, axis=1, keepdims=True) for corner in (a, b, c)], axis=1)
+    nearest_corner = np.eye(3)[np.einsum("rkj,nj->nrk", toward, units).argmax(axis=2)]
+    clamped = np.where(front[..., None], np.maximum(shares, 0.0), nearest_corner)
+    clamped /= clamped.sum(axis=2, keepdims=True)
     at = np.einsum("nri,rij->nrj", clamped, np.stack([a, b, c], axis=1))
     cosine = np.einsum("nrj,nj->nr", at, rays) / np.maximum(
         np.linalg.norm(at, axis=2) * np.linalg.norm(rays, axis=1, keepdims=True), 1e-12)
@@ -71,7 +75,7 @@ def region_weights(vertices: Array, points: Array, regions: Sequence[Region], ce
     of_vertex = np.array([s or "" for s in sheets])
     # A vertex of no sheet may lie in any region; one of a sheet only in its own or in a region of none.
     wrong = (of_vertex[:, None] != "") & (of_region[None, :] != "") & (of_vertex[:, None] != of_region[None, :])
-    angle = np.where(wrong | ~front & (angle < 1e-12), np.inf, angle)
+    angle = np.where(wrong, np.inf, angle)
     # Where several regions cover the vertex, the one whose triangle lies nearest to it along the ray.
     depth = np.abs(1.0 - np.where(front, 1.0 / np.where(front, total, 1.0), np.inf))
     best = np.lexsort((depth.T, np.round(angle, 9).T), axis=0)[0] if len(regions) > 1 else np.zeros(len(rays), int)

@@ -285,6 +285,8 @@ def load_face(face: str | Path = "akimoto") -> Face:
     >>> load_face().name
     'akimoto'
     """
+    if not isinstance(face, (str, Path)):
+        raise InputError(f"face: expected a name or a path, got {type(face).__name__}; see face_names()")
     shipped = _shipped()
     if str(face) in shipped:
         return _load(shipped[str(face)])

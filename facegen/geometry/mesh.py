@@ -72,6 +72,8 @@ class Mesh:
 
 def merge(meshes: Sequence[Mesh]) -> Mesh:
     """Return the meshes side by side as one; equal part and material names become one entry."""
+    if not meshes:
+        raise InputError("meshes: expected at least one mesh, got none")
     parts = tuple(dict.fromkeys(p for m in meshes for p in m.parts))
     materials = tuple(dict.fromkeys(x for m in meshes for x in m.materials))
     offsets = np.cumsum([0] + [len(m.vertices) for m in meshes])

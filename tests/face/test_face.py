@@ -185,5 +185,18 @@ def test_unknown_faces_are_named():
         load_face("akimotto")
 
 
+@pytest.mark.parametrize("face", [None, 3, ["akimoto"]])
+def test_a_face_is_a_name_or_a_path(face):
+    with pytest.raises(InputError, match="face: expected a name or a path"):
+        load_face(face)
+
+
+@pytest.mark.parametrize("name", ["akimoto", "akimoto-1986"])
+def test_the_weights_of_every_vertex_sum_to_one(name):
+    weights = load_face(name).deformer.weights
+    assert np.allclose(weights.sum(axis=1), 1.0)
+    assert weights.min() >= 0
+
+
 def test_people_differ(face):
     assert not np.allclose(face.pose("happiness"), face.pose("happiness", person="mika"))
