@@ -25,6 +25,6 @@ frames = face.pose_controls(batch, detail=1)                             # (30, 
 print("frames, vertices, axes:", frames.shape)
 
 mesh = face.mesh(1)
-pictures = [facegen.render(mesh, vertices, size=128, occlusion="neutral") for vertices in frames[::3]]
+pictures = [facegen.render(mesh, vertices, size=128) for vertices in frames[::3]]
 sheet = facegen.contact_sheet(pictures, [f"{3 * i / 20:.2f} s" for i in range(len(pictures))], columns=5)
 print(facegen.save_image(sheet, folder / "frames.png"))
