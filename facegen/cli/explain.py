@@ -65,7 +65,7 @@ def _gather(meaning: Resolution, face: str) -> dict[str, Any]:
     from facegen.facs.tables import load_units
 
     table, rig, one = load_units(), load_face(face), meaning.expression
-    controls = rig.controls(meaning.deformation)
+    controls = rig.controls(meaning.deformation, strict=not meaning.units)
     millimetres = {name: [round(float(c), 3) + 0.0 for c in vector]
                    for name, vector in zip(rig.feature_points, controls.vectors, strict=True) if vector.any()}
     letters = {weight: letter for letter, weight in table.catalogue.letters.items()}

@@ -52,7 +52,7 @@ def render(what: What, output: Out = None, face: FaceName = "akimoto", person: P
     from facegen.face.face import load_face
     from facegen.render import render as draw
 
-    picture = draw(load_face(face), meaning.deformation, size=pixels, view=angles, detail=detail,
+    picture = draw(load_face(face), meaning, size=pixels, view=angles, detail=detail,
                    background=ground, shading="flat" if flat else "smooth")
     save_image(picture, output)
     if json:

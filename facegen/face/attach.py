@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
-from scipy.spatial import cKDTree
 
 from facegen.geometry.mesh import Mesh
 
@@ -62,6 +61,37 @@ class Attachment:
         return np.array(out)
 
 
+BLOCK = 16
+"""Triangles that follow each other lie together: two subdivisions make sixteen of each."""
+
+BLOCKS_SEARCHED = 12
+"""Blocks whose middles are nearest to a point; its nearest triangles lie in them."""
+
+
+def _nearest(points: Array, centroids: Array, k: int) -> NDArray[np.intp]:
+    """Return the k nearest centroids (n, k) of each point, nearest first.
+
+    Coarse to fine, in NumPy: a tree of scipy.spatial finds the same a little sooner, but importing it takes
+    longer than the whole search.
+    """
+    m = len(centroids)
+    owner = np.minimum(np.arange(-(-m // BLOCK) * BLOCK), m - 1).reshape(-1, BLOCK)
+    middles = centroids[owner].mean(axis=1)
+
+    def squared(a: Array, b: Array) -> Array:
+        return (a * a).sum(-1)[:, None] - 2.0 * (a @ b.T) + (b * b).sum(-1)
+
+    blocks = min(BLOCKS_SEARCHED, len(middles))
+    coarse = np.argpartition(squared(points, middles), blocks - 1, axis=1)[:, :blocks]
+    candidates = owner[coarse].reshape(len(points), -1)
+    distance = ((centroids[candidates] - points[:, None]) ** 2).sum(-1)
+    repeated = np.zeros_like(distance, bool)
+    if m % BLOCK:                       # the last block is filled up with its last triangle
+        repeated[:] = (candidates == m - 1) & (np.cumsum(candidates == m - 1, axis=1) > 1)
+    order = np.argsort(np.where(repeated, np.inf, distance), axis=1)[:, :k]
+    return np.take_along_axis(candidates, order, axis=1)
+
+
 def attach(points: Array, surface: Array, faces: NDArray[np.int32],
            matrix: sparse.csr_array) -> sparse.csr_array:
     """Return the weights (n, n_cage) by which points (n, 3) follow the nearest triangle of a skin surface.
@@ -70,7 +100,7 @@ def attach(points: Array, surface: Array, faces: NDArray[np.int32],
     ``matrix``, so a part follows the smooth surface at every level of detail.
     """
     centroids = surface[faces].mean(axis=1)
-    _, near = cKDTree(centroids).query(points, k=np.arange(1, min(6, len(faces)) + 1))
+    near = _nearest(points, centroids, min(6, len(faces)))
     a, b, c = (surface[faces[near, i]] for i in range(3))
     e1, e2, d = b - a, c - a, points[:, None] - a
     g11, g12, g22 = ((p * q).sum(-1) for p, q in ((e1, e1), (e1, e2), (e2, e2)))

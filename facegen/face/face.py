@@ -1,6 +1,6 @@
 """A face: a cage with feature points and regions, its smooth surface, and the parts that ride on it.
 
-``face.yaml`` beside a cage holds all data of a face (docs/face.md explains the keys), so that another face needs
+``face.yaml`` beside a cage holds all data of a face (docs/faces.md explains the keys), so that another face needs
 no code. A face is a rig: ``pose(what)`` gives vertices, ``mesh(detail)`` what they belong to.
 """
 
@@ -102,14 +102,20 @@ class Face:
         """Return the vertices (n, 3), mm, of ``mesh(detail)`` under an expression.
 
         ``what``: an expression's name, an AU script (``"6C+12D"``), a mapping of unit codes to weights 0-1, a
-        :class:`Deformation`, or the path of a deformation file. ``person``: whose table overrides the common
-        one, by name or path. ``intensity`` scales the expression. InputError says what cannot be understood.
+        :class:`Deformation`, the path of a deformation file, or what :meth:`resolve` returned. ``person``: whose
+        table overrides the common one, by name or path. ``intensity`` scales the expression. InputError says what
+        cannot be understood.
         """
         found = self.resolve(what, person=person, intensity=intensity)
         return self.pose_controls(self.controls(found.deformation, strict=not found.units), detail=detail)
 
     def resolve(self, what: Any, *, person: Any = None, intensity: float = 1.0) -> Resolution:
-        """Return the chain name -> units -> deformation data (Akimoto 1986, fig. 10)."""
+        """Return the chain name -> units -> deformation data (Akimoto 1986, fig. 10).
+
+        What has been resolved already is returned as it is.
+        """
+        if isinstance(what, Resolution):
+            return what
         return resolve(what, person=person, intensity=intensity)
 
     def controls(self, deformation: Deformation, *, strict: bool = True) -> Controls:

@@ -43,9 +43,11 @@ def test_options_mean_what_the_api_means(run, tmp_path, options, arguments):
 
 
 @pytest.mark.parametrize("face", facegen.face_names())
-def test_every_face_draws(run, tmp_path, face):
+@pytest.mark.parametrize("what", ["figure-8", "R12A+R14A", "happiness"])
+def test_every_face_draws(run, tmp_path, face, what):
     out = tmp_path / "a.webp"
-    assert run("render", "figure-8", "-o", out, "--face", face, "--size", 48) == (0, "", "")
+    assert run("render", what, "-o", out, "--face", face, "--size", 48) == (0, "", "")
+    assert run("explain", what, "--face", face)[0] == 0
     assert out.stat().st_size > 100
 
 
