@@ -18,7 +18,7 @@ from facegen.facs.validate import Entry
 from facegen.facs.yamlfile import read_data
 from facegen.fileio.obj import load_obj
 from facegen.geometry.mesh import Mesh
-from facegen.geometry.subdivision import loop_levels
+from facegen.geometry.subdivision import Subdivision, loop_levels
 
 REQUIRED = ("name", "source", "cage", "centre_O", "measures", "scales", "points", "regions", "jaw", "eyes",
             "lids", "head")
@@ -166,8 +166,12 @@ def read_face(path: Path) -> FaceData:
                 raise entry.wrong("two vertices that share an edge of the cage")
     corners = indices(top["corners"]) if "corners" in top else np.empty(0, np.int32)
     load = cache(load_obj)      # several parts lie in one file
-    attachments = tuple(_part(e, path.parent, load, cage, creases, corners, eyes, with_parts,
-                              np.array(places))
+
+    @cache
+    def surface() -> Subdivision:       # what brows and hair ride on
+        return loop_levels(n, cage.faces, creases, 2, corners=corners)[2]
+
+    attachments = tuple(_part(e, path.parent, load, cage, surface, eyes, with_parts, np.array(places))
                         for e in (top["parts"].each() if "parts" in top else ()))
     parts = [a.mesh.parts[0] for a in attachments]
     for part, row in with_parts.items():
@@ -218,7 +222,7 @@ def _some(entry: Entry, count: int | None, expected: str) -> list[Entry]:
 
 
 
-def _part(entry: Entry, folder: Path, load: Callable[[Path], Mesh], cage: Mesh, creases, corners,
+def _part(entry: Entry, folder: Path, load: Callable[[Path], Mesh], cage: Mesh, surface: Callable[[], Subdivision],
           eyes: Mapping[str, Array], with_parts: Mapping[str, int], places: Array) -> Attachment:
     """Return one part of a file and what carries it."""
     fields = entry.fields(required=("file", "part", "carried_by"), optional=("eye", "fades"))
@@ -251,6 +255,6 @@ def _part(entry: Entry, folder: Path, load: Callable[[Path], Mesh], cage: Mesh, 
             raise entry.fail("a part carried by an eye needs eye: L or R")
         side = fields["eye"].choice(tuple(eyes), "eye")
         return Attachment(mesh, eye=list(eyes).index(side), centre=eyes[side])
-    sub = loop_levels(len(cage.vertices), cage.faces, creases, 2, corners=corners)[2]
+    sub = surface()
     return Attachment(mesh, skin=sparse.csr_array(
         attach(mesh.vertices, sub.matrix @ cage.vertices, sub.faces, sub.matrix)))
