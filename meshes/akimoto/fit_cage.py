@@ -120,6 +120,15 @@ def stereographic(points):
     return np.stack([d @ u, -(d @ v)], 1) / (1.0001 - d @ pole)[:, None]
 
 
+def inside(point, polygon):
+    """Return whether a 2D point lies inside a polygon (n, 2)."""
+    x, y = polygon.T
+    x2, y2 = np.roll(x, -1), np.roll(y, -1)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        hits = ((y > point[1]) != (y2 > point[1])) & (point[0] < (x2 - x) * (point[1] - y) / (y2 - y) + x)
+    return hits.sum() % 2 == 1
+
+
 def triangulate(xy, edges):
     """Return Delaunay triangles (m, 3) of the points in which all ``edges`` (pairs) are present."""
     tri = [tuple(t) for t in Delaunay(xy).simplices]
@@ -190,17 +199,10 @@ def build(target, target_faces):
                       *(f"lip_seam_upper_{i}" for i in (3, 2, 1)), "lip_seam_upper_0_M"])]
     base = polygon(["base_M", "base_1", "base_2", "base_3", "base_back_M"])
 
-    def inside(point, loop):
-        x, y = flat[loop].T
-        x2, y2 = np.roll(x, -1), np.roll(y, -1)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            hits = ((y > point[1]) != (y2 > point[1])) & (point[0] < (x2 - x) * (point[1] - y) / (y2 - y) + x)
-        return hits.sum() % 2 == 1
-
     kept = []
     for t in tri:
         c = flat[list(t)].mean(0)
-        if any(inside(c, h) for h in holes) or set(t) <= set(base):
+        if any(inside(c, flat[h]) for h in holes) or set(t) <= set(base):
             continue
         if sum(i in middle for i in t) == 3:
             continue
@@ -484,18 +486,11 @@ def write(names, vertices, faces, materials, creases, corners) -> None:
     tri = triangulate(flat, edges)
     holes = [[where[n] for n in rings[0][:-1]], [where[n] for n in rings[1] + rings[2][-2::-1]]]
 
-    def inside(point, loop):
-        x, y = flat[loop].T
-        x2, y2 = np.roll(x, -1), np.roll(y, -1)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            hits = ((y > point[1]) != (y2 > point[1])) & (point[0] < (x2 - x) * (point[1] - y) / (y2 - y) + x)
-        return hits.sum() % 2 == 1
-
     regions = []
     for t in tri:
         corners_of = [left[i] for i in t]
         area = np.linalg.det(np.column_stack([flat[list(t)], np.ones(3)]))
-        if any(inside(flat[list(t)].mean(0), h) for h in holes) or abs(area) < 1e-7:
+        if any(inside(flat[list(t)].mean(0), flat[h]) for h in holes) or abs(area) < 1e-7:
             continue
         sheet = next((f"mouth_{p}" for p in ("upper", "lower") if any(n.startswith(f"lip_{p}") for n in corners_of)),
                      None)
