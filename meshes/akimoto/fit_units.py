@@ -1,4 +1,4 @@
-"""Fit deformation data to measured motion; the helper of ``tables/write_deformations.py``.
+"""Fit deformation data to measured motion, for write_deformations.py.
 
 Inputs: the measured head of ``fit_cage.py`` and how its skin moves in named face units at full strength
 (``face_units.npz``: ``names``, ``displacement_mm`` (units, vertices, 3)). For each unit: least squares on the
