@@ -18,7 +18,6 @@ from scipy import sparse
 
 from facegen.data import meshes_dir
 from facegen.errors import InputError, nearest
-from facegen.face.attach import Attachment, attach
 from facegen.face.deformer import Array, Deformer
 from facegen.face.eye import eyeball_radius
 from facegen.face.folds import fold_field
@@ -165,11 +164,10 @@ class Face:
     def pose_controls(self, controls: Controls, *, detail: int = 2) -> Array:
         """Return vertices (..., n, 3), mm, of ``mesh(detail)`` for (a batch of) controls."""
         d, level = self._data, self._level(detail)
+        batch = controls.vectors.shape[:-2]
+        if not any(np.any(part) for part in vars(controls).values()):
+            return np.broadcast_to(level.mesh.vertices, (*batch, *level.mesh.vertices.shape)).copy()
         cage = self.deformer.deform(controls.vectors, controls.jaw, controls.lids)
-        if not (np.any(controls.vectors) or np.any(controls.jaw) or np.any(controls.lids) or np.any(controls.eyes)
-                or np.any(controls.head) or np.any(controls.folds)):
-            return np.broadcast_to(level.mesh.vertices, (*cage.shape[:-2], *level.mesh.vertices.shape)).copy()
-        batch = cage.shape[:-2]
         flat = np.moveaxis(cage.reshape(-1, *cage.shape[-2:]), 0, 1).reshape(cage.shape[-2], -1)
         skin = np.moveaxis((level.matrix @ flat).reshape(level.matrix.shape[0], -1, 3), 1, 0)
         skin = np.ascontiguousarray(skin).reshape(*batch, -1, 3)
@@ -308,6 +306,3 @@ def load_face(face: str | Path = "akimoto") -> Face:
 @cache
 def _load(path: Path) -> Face:
     return Face(read_face(path))
-
-
-__all__ = ["Attachment", "Controls", "Face", "attach", "face_names", "load_face"]

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from facegen.errors import FileError, InputError, nearest
+from facegen.fileio.textfile import whole_file
 
 # Pillow's name and settings for each suffix. PNG at level 6: a third smaller than level 1, 15 ms more.
 _FORMATS = {
@@ -40,16 +41,8 @@ def save_image(pixels: ArrayLike, path: str | os.PathLike[str]) -> Path:
 
     from PIL import Image  # lazy: most of facegen works without it
 
-    draft = path.with_name(f".{path.name}.{os.getpid()}.part")
-    try:
-        try:
-            with open(draft, "wb") as file:
-                Image.fromarray(pixels).save(file, kind, **settings)
-            os.replace(draft, path)
-        finally:
-            draft.unlink(missing_ok=True)
-    except OSError as error:
-        raise FileError(f"{path}: the picture cannot be written: {error.strerror or error}") from error
+    with whole_file(path, "the picture ") as draft, open(draft, "wb") as file:
+        Image.fromarray(pixels).save(file, kind, **settings)
     return path
 
 

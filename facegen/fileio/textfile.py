@@ -1,28 +1,37 @@
-"""Text files that appear whole or not at all."""
+"""Files that appear whole or not at all."""
 
 from __future__ import annotations
 
 import os
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 from facegen.errors import FileError
 
 
-def save_text(text: str, path: str | os.PathLike[str]) -> Path:
-    """Write a text as UTF-8 with Unix line ends and return its path; FileError if it cannot be written.
+@contextmanager
+def whole_file(path: Path, what: str = "") -> Iterator[Path]:
+    """Yield a draft beside ``path`` to be written, then rename it; FileError if that fails.
 
-    It is written beside its place and renamed, so an existing file is replaced whole or stays as it was.
+    An existing file is replaced whole or stays as it was. ``what`` goes before "cannot be written".
     """
-    path = Path(path)
     draft = path.with_name(f".{path.name}.{os.getpid()}.part")
     try:
         try:
-            draft.write_text(text, encoding="utf-8", newline="\n")
+            yield draft
             os.replace(draft, path)
         finally:
             draft.unlink(missing_ok=True)
     except OSError as error:
-        raise FileError(f"{path}: cannot be written: {error.strerror or error}") from error
+        raise FileError(f"{path}: {what}cannot be written: {error.strerror or error}") from error
+
+
+def save_text(text: str, path: str | os.PathLike[str]) -> Path:
+    """Write a text as UTF-8 with Unix line ends, whole, and return its path; FileError if it cannot be."""
+    path = Path(path)
+    with whole_file(path) as draft:
+        draft.write_text(text, encoding="utf-8", newline="\n")
     return path
 
 
