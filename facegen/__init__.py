@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from facegen.facs.tables import load_expressions, load_person, load_units
     from facegen.fileio.images import contact_sheet, save_image
     from facegen.geometry.mesh import Mesh
-    from facegen.render import render
+    from facegen.render import Renderer, render
 
 __version__ = "0.1.0"
 
@@ -39,6 +39,7 @@ __all__ = [
     "InputError",
     "Mesh",
     "NotationError",
+    "Renderer",
     "Resolution",
     "TableError",
     "canonical",
@@ -68,6 +69,7 @@ _HOMES = {
     "facegen.facs.tables": ("load_expressions", "load_person", "load_units"),
     "facegen.fileio.images": ("contact_sheet", "save_image"),
     "facegen.geometry.mesh": ("Mesh",),
+    "facegen.render.render": ("Renderer",),
     "facegen": ("render",),                 # the package itself: calling it draws
 }
 _HOME = {name: module for module, names in _HOMES.items() for name in names}

@@ -1,11 +1,12 @@
-"""From vertices to pictures. ``facegen.render`` is this package and, called, its one door: `render`."""
+"""From vertices to pictures. ``facegen.render`` is this package and, called, its door: `render`."""
 
 import sys
 from types import ModuleType
 
-from facegen.render.render import render
+from facegen.render.backends import RENDERERS
+from facegen.render.render import Renderer, render
 
-__all__ = ["render"]
+__all__ = ["RENDERERS", "Renderer", "render"]
 
 
 class _Callable(ModuleType):

@@ -8,7 +8,7 @@ from shapes import box, shuffled, sphere
 from facegen.errors import InputError
 from facegen.geometry.camera import frame
 from facegen.geometry.mesh import Mesh, merge
-from facegen.render import render
+from facegen.render import Renderer, render
 from facegen.render.scene import Light, Scene
 
 GOLDEN = Path(__file__).parent / "golden"
@@ -167,13 +167,23 @@ def test_rigs_are_asked_for_a_mesh_and_a_pose():
 
 
 @pytest.mark.parametrize(("size", "options", "detail"), [
-    (64, {}, 1), (512, {}, 2), (1100, {}, 3), (64, {"detail": 3}, 3), (64, {"shading": "flat"}, 0),
+    (32, {}, 0), (128, {}, 2), (512, {}, 3), (64, {"detail": 3}, 3), (64, {"shading": "flat"}, 0),
     (64, {"shading": "flat", "detail": 2}, 2),
 ])
 def test_detail_follows_the_size(size, options, detail):
     rig = BallRig()
     render(rig, size=size, occlusion="off", **options)
-    assert set(rig.details) == {detail}
+    assert rig.details[-1] == detail
+
+
+def test_detail_gives_triangles_of_a_few_pixels():
+    from facegen import load_face
+
+    face = load_face()
+    chosen = [Renderer(face, size=size, occlusion="off").detail for size in (32, 128, 256, 512, 1024, 4096)]
+    assert chosen == sorted(chosen)
+    assert chosen[0] == 0
+    assert chosen[3:] == [2, 3, 3]
 
 
 def test_wide_tall_and_large_pictures():

@@ -1,0 +1,109 @@
+"""The NumPy renderer: the Z-buffer drawn in bands, each pixel's light computed once where that is enough."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from facegen.geometry.camera import Camera
+from facegen.geometry.mesh import Mesh
+from facegen.geometry.normals import vertex_normals
+from facegen.render.occlusion import visibility
+from facegen.render.request import Look
+from facegen.render.scene import Scene
+from facegen.render.shading import from_srgb, shade, surface, to_srgb
+from facegen.render.zbuffer import prepare, scan
+
+# Samples held at once: the picture is drawn in bands, so that its size does not decide the memory.
+_BAND_SAMPLES = 2**18
+# Share of the scene's depth within a pixel above which its four samples are shaded one by one.
+DEPTH_STEP = 0.01
+
+
+class SoftBackend:
+    """Draws poses of one mesh for one camera, with NumPy alone."""
+
+    def __init__(self, neutral: Mesh, camera: Camera, scene: Scene, look: Look) -> None:
+        self.neutral, self.camera, self.scene, self.look = neutral, camera, scene, look
+
+    def draw(self, vertices: NDArray[np.float64]) -> NDArray[np.uint8]:
+        """Return the picture (h, w, 4) of checked vertices (n, 3)."""
+        mesh, camera, scene, look = self.neutral.with_vertices(vertices), self.camera, self.scene, self.look
+        baked = None if look.occlusion == "off" else mesh if look.occlusion == "posed" else self.neutral
+        seen = None if baked is None else visibility(baked)
+        normals = None if baked is None or baked is mesh else vertex_normals(baked.vertices, baked.faces)
+        prepared = surface(mesh, camera, scene, flat=look.flat, seen=seen, seen_normals=normals)
+        width, height = camera.width, camera.height
+        triangles = prepare(nearness_points(mesh.vertices, camera), mesh.faces, width=width, height=height, samples=4)
+        picture = np.empty((height, width, 4), np.uint8)
+        rows = max(1, _BAND_SAMPLES // (4 * width))
+        for top in range(0, height, rows):
+            bottom = min(top + rows, height)
+            light, cover = _band(triangles, prepared, camera, scene, top, bottom)
+            picture[top:bottom] = _finished(light, cover, look.background, scene, top, height)
+        return picture
+
+
+def nearness_points(vertices: NDArray, camera: Camera) -> NDArray[np.float64]:
+    """Return vertices (n, 3) as the Z-buffer wants them: pixels x and y, nearness within 0.01..0.99, NaN before the
+    near plane."""
+    projected = camera.project(vertices)
+    in_front = projected[:, 2] > camera.near
+    near = camera.nearness(projected[:, 2])
+    low, high = (near[in_front].min(), near[in_front].max()) if in_front.any() else (0.0, 1.0)
+    # Kept off 0, which means "nothing" in the buffer.
+    projected[:, 2] = np.where(in_front, 0.01 + 0.98 * (near - low) / max(high - low, 1e-12), np.nan)
+    return projected
+
+
+def _band(triangles, prepared, camera, scene, top, bottom) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """Return premultiplied linear light (3, rows, width) and coverage (rows, width) of some pixel rows.
+
+    A pixel whose four samples see one continuous piece of one material is shaded once, at its centre; any
+    other pixel four times, at its samples.
+    """
+    ids, nearness = scan(triangles, top, bottom)
+    rows, samples, width = ids.shape
+    light = np.zeros((3, rows, width), np.float32)
+    hit = ids >= 0
+    cover = hit.mean(axis=1, dtype=np.float32)
+    kind = np.where(hit, (2 * prepared.material + prepared.back)[ids], -1)
+    one = ((kind == kind[:, :1]).all(axis=1) & hit[:, 0]
+           & (nearness.max(axis=1) - nearness.min(axis=1) < np.float32(DEPTH_STEP)))
+    y, x = np.nonzero(one)
+    light[:, y, x] = shade(prepared, camera, scene, ids[y, 1, x], x + 0.5, y + (top + 0.5))
+
+    y, x = np.nonzero(hit.any(axis=1) & ~one)
+    mixed = ids[y, :, x]                                                        # (k, samples)
+    k, s = np.nonzero(mixed >= 0)
+    total = np.zeros((3, len(y), samples), np.float32)
+    across, down = np.array(triangles.sample_x)[s], top + (s + 0.5) / samples
+    total[:, k, s] = shade(prepared, camera, scene, mixed[k, s], x[k] + across, y[k] + down)
+    light[:, y, x] = total.mean(axis=2)
+    return light, cover
+
+
+def _finished(light, cover, background, scene, top, height) -> NDArray[np.uint8]:
+    """Return the band (rows, width, 4) over its background: resolved in linear light, then sRGB."""
+    rows, width = cover.shape
+    out = np.empty((rows, width, 4), np.uint8)
+    if background == "transparent":
+        light = light / np.maximum(cover, np.float32(1e-6))
+        out[..., 3] = np.rint(cover * 255)
+    else:
+        behind = background_rows(background, scene, height)[top:top + rows].T[:, :, None]
+        light = light + behind * (1 - cover)
+        out[..., 3] = 255
+    out[..., :3] = np.moveaxis(to_srgb(light), 0, -1)
+    return out
+
+
+def background_rows(background: str | tuple[float, float, float], scene: Scene, height: int) -> NDArray[np.float32]:
+    """Return the linear colour (height, 3) behind each row of pixels; "transparent" has none: zeros."""
+    if background == "transparent":
+        return np.zeros((height, 3), np.float32)
+    if not isinstance(background, str):
+        return np.tile(from_srgb(background), (height, 1))
+    share = ((np.arange(height) + 0.5) / height)[:, None]
+    high, low = (np.array(c, np.float64) for c in scene.background)
+    return np.array([from_srgb(tuple(c)) for c in high + (low - high) * share])
