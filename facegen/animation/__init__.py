@@ -1,0 +1,1 @@
+"""Poses over time: clips of keyframes and events, idle motion, sampled at any rate."""
