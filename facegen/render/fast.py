@@ -44,11 +44,12 @@ class FastBackend:
                                 for way, lamp in zip(towards, scene.lights, strict=True)], np.float32).reshape(-1, 7)
         self._sky = np.array([*scene.ground, *np.subtract(scene.sky, scene.ground), *unit(scene.window)], np.float32)
         self._behind = background_rows(look.background, scene, camera.height)
-        self._behind_bytes = np.full((camera.height, 4), 255, np.uint8)
-        self._behind_bytes[:, :3] = to_srgb(self._behind)
         self._transparent = look.background == "transparent"
+        ground = np.full((camera.height, 4), 0 if self._transparent else 255, np.uint8)
+        ground[:, :3] = to_srgb(self._behind)
+        self._blank = np.tile(ground[:, None, :], (1, camera.width, 1))
         if self._transparent:
-            self._behind_bytes[:] = 0
+            self._blank[:] = 0
         self._towards = towards @ camera.rotation
         self._spreads = np.array([lamp.spread for lamp in scene.lights])
         self._light = np.ones((n, 1 + lights), np.float32)
@@ -77,7 +78,7 @@ class FastBackend:
             light = light_shares(visibility(self.neutral.with_vertices(vertices)), normals, self._faces,
                                  self._towards, self._spreads)
             normals = normals @ self.camera.rotation.T
-        picture = np.empty((height, width, 4), np.uint8)
+        picture = self._blank.copy()
 
         def bands(thread: int) -> None:
             own = self._scratch[thread]
@@ -86,8 +87,8 @@ class FastBackend:
                 thread, len(self._starts) - 1, self._threads, items, self._starts, vertices, self._faces, self._proj,
                 self._snapped, self._depth, self._kind, self._inside, self._cam, self.look.flat, normals is not None,
                 self._adjacency, self._ring, own.attributes, own.vertex_ready, own.planes, own.ready, self._material,
-                self._lamps, self._sky, self._view, _powers(), srgb_table(), self._behind, self._behind_bytes,
-                self._transparent, picture)
+                self._lamps, self._sky, self._view, _powers(), srgb_table(), self._behind,
+                self._transparent, picture.view(np.uint32)[..., 0])
 
         if self._threads == 1:
             bands(0)
