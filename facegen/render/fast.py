@@ -62,7 +62,8 @@ class FastBackend:
         self._lobes, self._faint = light_lobes(towards @ camera.rotation,
                                                np.array([lamp.spread for lamp in scene.lights]))
         bands = -(-camera.height // kernels.BAND_ROWS)
-        self._threads = 1 if camera.width * camera.height < _WORTH_THREADS else min(_cores(), bands)
+        small = camera.width * camera.height < _WORTH_THREADS
+        self._threads = 1 if small else min(look.threads or _cores(), bands)
         self._proj, self._snapped, self._depth = np.empty((n, 3)), np.empty((n, 2), np.int32), np.empty(n)
         self._kind, self._first, self._last = np.empty(m, np.int16), np.empty(m, np.int32), np.empty(m, np.int32)
         self._starts = np.empty(bands + 1, np.int64)

@@ -56,7 +56,7 @@ _P0, _P1, _P2, _P3, _P4, _P5, _P6, _P7, _P8, _P9, _P10, _P11, _P12, _P13 = (np.u
 
 @njit(**OPTIONS)
 def project(vertices, cam, proj, snapped, depth):
-    """Fill proj (n, 3): pixel x, y, depth in units; snapped (n, 2): sub-pixels; depth (n,): -1 before the near plane."""
+    """Fill proj (n, 3): pixel x, y, depth in units; snapped (n, 2) sub-pixels; depth (n,): -1 before the near plane."""
     ortho, near = cam[16] != 0.0, cam[17]
     low, high = np.inf, -np.inf
     for v in range(len(vertices)):
