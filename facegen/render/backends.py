@@ -23,7 +23,11 @@ class Backend(Protocol):
 
 
 # Name -> where it lives. Imported when asked for: two of them need packages that not everybody has.
-_HOMES = {"soft": ("facegen.render.soft", "SoftBackend"), "gl": ("facegen.render.gl", "GlBackend")}
+_HOMES = {
+    "soft": ("facegen.render.soft", "SoftBackend"),
+    "fast": ("facegen.render.fast", "FastBackend"),
+    "gl": ("facegen.render.gl", "GlBackend"),
+}
 
 RENDERERS = ("auto", *_HOMES)
 

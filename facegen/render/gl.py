@@ -24,7 +24,7 @@ import warnings
 import weakref
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from functools import partial
+from functools import cache, partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,19 +32,21 @@ from numpy.typing import NDArray
 from facegen.errors import InputError
 from facegen.geometry.camera import Camera
 from facegen.geometry.mesh import Mesh
-from facegen.geometry.normals import vertex_normals
+from facegen.geometry.normals import face_normals, vertex_normals
 from facegen.render.glsl import fragment_shader, vertex_shader
-from facegen.render.occlusion import visibility
+from facegen.render.occlusion import light_shares, visibility
 from facegen.render.request import Look
 from facegen.render.scene import Scene
-from facegen.render.shading import Surface, surface
-from facegen.render.soft import _finished
+from facegen.render.shading import light_directions, material_rows, to_srgb
+from facegen.render.soft import background_rows
 
 SAMPLES = 4
 # Attributes of a pyrender primitive after position and normal, with their floats: they carry the light shares and
 # the material's index.
 _SLOTS = (("tangents", 4), ("texcoord_0", 2), ("texcoord_1", 2), ("color_0", 4))
 MAX_LIGHTS = sum(size for _, size in _SLOTS) - 2
+# The bits of 1 as a half float; those of all values 0..1 come before, in order.
+_ONE = 0x3C00
 _OTHERS = 'the other renderers need no OpenGL, for example renderer="auto"'
 
 
@@ -299,18 +301,23 @@ class GlBackend:
         if len(scene.lights) > MAX_LIGHTS:
             raise InputError(f"scene: renderer='gl' draws up to {MAX_LIGHTS} lights, got {len(scene.lights)}; {_OTHERS}")
         self.neutral, self.camera, self.scene, self.look = neutral, camera, scene, look
-        prepared = surface(neutral, camera, scene, flat=look.flat)
         self._corners, faces, material = _expanded(neutral, look.flat)
         shares = 1 + len(scene.lights)
         slots = _used_slots(shares + 1)
-        # Position, normal, light shares, material and what the last attribute has over; drawn from as it is.
+        # Position, normal, light shares, material and what the last attribute has over, as the card reads them.
         self._data = np.zeros((len(self._corners), 6 + sum(size for _, size in slots)), np.float32)
+        self._own_light = self._data[:, 6:6 + shares]
+        self._own_light[:] = 1.0
         self._data[:, 6 + shares] = material
+        if look.occlusion == "neutral":
+            self._own_light[:] = self._light(neutral, vertex_normals(neutral.vertices, neutral.faces))[self._corners]
+        self._behind = background_rows(look.background, scene, camera.height)
+        materials = material_rows(neutral, scene)
+        shaders = (vertex_shader([size for _, size in slots], shares, materials),
+                   fragment_shader(scene, materials[-1, :3]))
         with _current() as context:
             _check_size(camera, context.largest)
             framebuffer = _kept(context.framebuffers, (camera.width, camera.height), _Framebuffer)
-            shaders = (vertex_shader([size for _, size in slots], shares, prepared.albedo, prepared.wrap, prepared.gloss),
-                       fragment_shader(scene, prepared.albedo[-1]))
             self._renderer = _Renderer(framebuffer, _kept(context.programs, shaders, _Program), camera)
             self._primitive = pyrender.Primitive(self._data[:, :3], self._data[:, 3:6], indices=faces, material=_BARE,
                                                  **_attributes(self._data, slots))
@@ -332,9 +339,7 @@ class GlBackend:
             GL.glBindBuffer(GL.GL_ARRAY_BUFFER, self._primitive._buffers[0])
             GL.glBufferSubData(GL.GL_ARRAY_BUFFER, 0, self._data.nbytes, self._data)
             pixels = self._renderer.render(self._scene, pyrender.RenderFlags.OFFSCREEN)
-        pixels = pixels.astype(np.float32)
-        return _finished(np.moveaxis(pixels[..., :3], -1, 0), pixels[..., 3], self.look.background, self.scene, 0,
-                         self.camera.height)
+        return self._finished(pixels)
 
     def close(self) -> None:
         """Free the OpenGL objects now; otherwise that is done when a later picture is drawn."""
@@ -346,24 +351,53 @@ class GlBackend:
     def _fill(self, vertices: NDArray[np.float64]) -> None:
         """Write the vertices of a pose, with their normals and light, into the data to upload."""
         camera, corners, data = self.camera, self._corners, self._data
-        prepared = self._surface(vertices)
         # In camera axes from the target: float32 is then fine however far from the origin a mesh lies.
         local = (vertices - camera.target) @ camera.rotation.T
         self._lens.hold(camera.distance - local[:, 2])
         data[:, :3] = local[corners]
-        data[:, 3:6] = np.repeat(prepared.normals, 3, axis=0) if prepared.flat else prepared.normals[corners]
-        data[:, 6:6 + prepared.light.shape[1]] = prepared.light[corners]
+        posed = self.look.occlusion == "posed"
+        if posed or not self.look.flat:
+            smooth = vertex_normals(vertices, self.neutral.faces)
+        if self.look.flat:
+            data[:, 3:6] = np.repeat(face_normals(vertices, self.neutral.faces) @ camera.rotation.T, 3, axis=0)
+        else:
+            data[:, 3:6] = (smooth @ camera.rotation.T)[corners]
+        if posed:
+            self._own_light[:] = self._light(self.neutral.with_vertices(vertices), smooth)[corners]
 
-    def _surface(self, vertices: NDArray[np.float64]) -> Surface:
-        mesh, look = self.neutral.with_vertices(vertices), self.look
-        baked = None if look.occlusion == "off" else mesh if look.occlusion == "posed" else self.neutral
-        seen = None if baked is None else visibility(baked)
-        normals = None if baked is None or baked is mesh else vertex_normals(baked.vertices, baked.faces)
-        return surface(mesh, self.camera, self.scene, flat=look.flat, seen=seen, seen_normals=normals)
+    def _light(self, mesh: Mesh, normals: NDArray) -> NDArray[np.float32]:
+        """Return the light shares (n, 1 + lights) of a mesh's vertices."""
+        spreads = np.array([lamp.spread for lamp in self.scene.lights])
+        towards = light_directions(self.scene) @ self.camera.rotation
+        return light_shares(visibility(mesh), normals, mesh.faces, towards, spreads)
+
+    def _finished(self, pixels: NDArray[np.float16]) -> NDArray[np.uint8]:
+        """Return premultiplied linear light and coverage over the background, in sRGB."""
+        picture = _srgb_of_halves().take(pixels.view(np.uint16), mode="clip")
+        cover = pixels[..., 3]
+        transparent = self.look.background == "transparent"
+        if not transparent:
+            picture[..., 3] = 255
+            np.copyto(picture[..., :3], to_srgb(self._behind)[:, None], where=(cover == 0)[..., None])
+        y, x = np.nonzero((cover > 0) & (cover < 1))
+        light, part = np.split(pixels[y, x].astype(np.float32), [3], axis=1)
+        if transparent:
+            light /= part
+            picture[y, x, 3] = np.rint(part[:, 0] * 255)
+        else:
+            light += self._behind[y] * (1 - part)
+        picture[y, x, :3] = to_srgb(light)
+        return picture
 
 
 # Both sides are drawn, opaque; all else about a material is in the program.
 _BARE = pyrender.MetallicRoughnessMaterial(doubleSided=True, alphaMode="OPAQUE")
+
+
+@cache
+def _srgb_of_halves() -> NDArray[np.uint8]:
+    """Return the sRGB bytes of all half floats 0..1 by their bits; beyond the end is 1, so is NaN."""
+    return to_srgb(np.arange(_ONE + 1, dtype=np.uint16).view(np.float16).astype(np.float32))
 
 
 def _kept(store, key, make):

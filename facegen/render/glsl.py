@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
-import numpy as np
 from numpy.typing import NDArray
 
 from facegen.render import shading
@@ -95,11 +94,11 @@ void main() {{
 """
 
 
-def vertex_shader(slots: Sequence[int], shares: int, albedo: NDArray, wrap: NDArray, gloss: NDArray) -> str:
+def vertex_shader(slots: Sequence[int], shares: int, materials: NDArray) -> str:
     """Return the vertex shader.
 
     slots: floats of each attribute after position and normal; they hold ``shares`` light shares, then the index of
-    the material. albedo, wrap (k, 3) and gloss (k, 4): the tables of `shading.Surface`.
+    the material. materials: (k, 10), see `shading.material_rows`.
     """
     values = [f"extra_{a}.{'xyzw'[c]}" for a, size in enumerate(slots) for c in range(size)]
     return _VERTEX.format(
@@ -107,28 +106,28 @@ def vertex_shader(slots: Sequence[int], shares: int, albedo: NDArray, wrap: NDAr
         outputs=_packs("out", shares),
         pass_on="\n    ".join(f"{place} = {value};" for place, value in zip(_places(shares), values, strict=False)),
         material=values[shares],
-        count=len(albedo),
-        albedo_specular=_list(np.column_stack([albedo, gloss[:, 0]])),
-        wrap_shininess=_list(np.column_stack([wrap, gloss[:, 1]])),
-        catch_lift=_list(gloss[:, 2:4]),
+        count=len(materials),
+        albedo_specular=_list(materials[:, [0, 1, 2, 6]]),
+        wrap_shininess=_list(materials[:, [3, 4, 5, 7]]),
+        catch_lift=_list(materials[:, 8:]),
     )
 
 
 def fragment_shader(scene: Scene, inside: NDArray) -> str:
     """Return the fragment shader; ``inside`` (3,) is the linear colour of back faces."""
     shares = 1 + len(scene.lights)
-    lamps = [f"lamp({_vector(_unit(light.towards))}, {_vector(light.colour)}, {_number(light.highlight)}, share[{k}]);"
-             for k, light in enumerate(scene.lights, start=1)]
+    lamps = [f"lamp({_vector(way)}, {_vector(light.colour)}, {_number(light.highlight)}, share[{k}]);"
+             for k, (way, light) in enumerate(zip(shading.light_directions(scene), scene.lights, strict=True), start=1)]
     return _FRAGMENT.format(
         inputs=_packs("in", shares), shares=shares, share_list=", ".join(_places(shares)),
         lamps="\n        ".join(lamps),
-        sky=_vector(scene.sky), ground=_vector(scene.ground), window=_vector(_unit(scene.window)),
+        sky=_vector(scene.sky), ground=_vector(scene.ground), window=_vector(shading.unit(scene.window)),
         inside=_vector(inside),
-        bounce=_number(shading._BOUNCE), darkest=_number(shading._DARKEST), rest=_number(1 - shading._DARKEST),
-        cavity=_number(shading._CAVITY), inside_light=_number(shading._INSIDE_LIGHT),
-        window_gone=_number(shading._WINDOW_GONE),
-        window_edge=_number(shading._WINDOW_FULL - shading._WINDOW_GONE),
-        shoulder=_number(shading._SHOULDER), room=_number(1 - shading._SHOULDER),
+        bounce=_number(shading.BOUNCE), darkest=_number(shading.DARKEST), rest=_number(1 - shading.DARKEST),
+        cavity=_number(shading.CAVITY), inside_light=_number(shading.INSIDE_LIGHT),
+        window_gone=_number(shading.WINDOW_GONE),
+        window_edge=_number(shading.WINDOW_FULL - shading.WINDOW_GONE),
+        shoulder=_number(shading.SHOULDER), room=_number(1 - shading.SHOULDER),
     )
 
 
@@ -152,6 +151,3 @@ def _vector(values: Iterable[float]) -> str:
 def _number(value: float) -> str:
     return repr(float(value))                            # always with a point or an exponent: GLSL wants one
 
-
-def _unit(vector: Sequence[float]) -> NDArray[np.float64]:
-    return np.asarray(vector, np.float64) / np.linalg.norm(vector)
