@@ -299,8 +299,10 @@ class GlBackend:
 
     def __init__(self, neutral: Mesh, camera: Camera, scene: Scene, look: Look) -> None:
         if len(scene.lights) > MAX_LIGHTS:
-            raise InputError(f"scene: renderer='gl' draws up to {MAX_LIGHTS} lights, got {len(scene.lights)}; {_OTHERS}")
+            raise InputError(f"scene: renderer='gl' draws up to {MAX_LIGHTS} lights, "
+                             f"got {len(scene.lights)}; {_OTHERS}")
         self.neutral, self.camera, self.scene, self.look = neutral, camera, scene, look
+        self._turn = threading.Lock()
         self._corners, faces, material = _expanded(neutral, look.flat)
         shares = 1 + len(scene.lights)
         slots = _used_slots(shares + 1)
@@ -334,11 +336,12 @@ class GlBackend:
 
     def draw(self, vertices: NDArray[np.float64]) -> NDArray[np.uint8]:
         """Return the picture (h, w, 4) of checked vertices (n, 3)."""
-        self._fill(vertices)
-        with _current():
-            GL.glBindBuffer(GL.GL_ARRAY_BUFFER, self._primitive._buffers[0])
-            GL.glBufferSubData(GL.GL_ARRAY_BUFFER, 0, self._data.nbytes, self._data)
-            pixels = self._renderer.render(self._scene, pyrender.RenderFlags.OFFSCREEN)
+        with self._turn:
+            self._fill(vertices)
+            with _current():
+                GL.glBindBuffer(GL.GL_ARRAY_BUFFER, self._primitive._buffers[0])
+                GL.glBufferSubData(GL.GL_ARRAY_BUFFER, 0, self._data.nbytes, self._data)
+                pixels = self._renderer.render(self._scene, pyrender.RenderFlags.OFFSCREEN)
         return self._finished(pixels)
 
     def close(self) -> None:
@@ -426,7 +429,7 @@ def _attributes(data: NDArray[np.float32], slots: list[tuple[str, int]]) -> dict
 
 
 def _expanded(mesh: Mesh, flat: bool) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int32]]:
-    """Return the vertices to upload - each one's vertex of the mesh and its material - and the triangles (m, 3) of them.
+    """Return the vertices to upload (of the mesh, by index), the triangles (m, 3) of them and each one's material.
 
     A vertex is there once for each material round it, and flat once for each triangle, whose normal it carries.
     """
