@@ -200,7 +200,7 @@ def test_too_many_lights_and_too_large_pictures_are_refused(monkeypatch):
     with gl._current() as context:
         assert context.largest >= 4096
         monkeypatch.setattr(context, "largest", 2048)
-    with pytest.raises(InputError, match="^size: this OpenGL draws up to 2048 pixels a side, got 2049x64; the other"):
+    with pytest.raises(InputError, match=r"^size: this OpenGL draws up to 2048 pixels a side, got 2049x64; the other"):
         Renderer(sphere(), size=(2049, 64), renderer="gl")
 
 
@@ -213,7 +213,12 @@ def run(code, *flags, **environment):
     return done.returncode, done.stdout, done.stderr
 
 
-ERROR = "try:\n    facegen.render(mesh, size=64, renderer='gl')\nexcept facegen.InputError as error:\n    print(error)\n"
+ERROR = """
+try:
+    facegen.render(mesh, size=64, renderer='gl')
+except facegen.InputError as error:
+    print(error)
+"""
 DRAW = "pixels = facegen.render(mesh, size=64, renderer='gl', occlusion='off')\nprint(pixels.shape)\n"
 
 
@@ -235,7 +240,8 @@ sys.meta_path.insert(0, Missing())
 """
     status, out, err = run(code + ERROR + ERROR)
     assert (status, err) == (0, "")
-    assert out.count(f"{package} is not installed: pip install \"facegen[gl]\"; the other renderers need no OpenGL") == 2
+    mend = f'{package} is not installed: pip install "facegen[gl]"; the other renderers need no OpenGL'
+    assert out.count(mend) == 2
 
 
 def test_a_missing_library_names_the_debian_packages():
@@ -254,7 +260,8 @@ ctypes.CDLL.__init__ = fail
     assert "apt-get install libegl1 libgl1 libgl1-mesa-dri; the other renderers need no OpenGL" in out
 
 
-@pytest.mark.parametrize("environment", [{"__EGL_VENDOR_LIBRARY_DIRS": "/nonexistent"}, {"EGL_DEVICE_ID": "99"}], ids=str)
+@pytest.mark.parametrize("environment", [{"__EGL_VENDOR_LIBRARY_DIRS": "/nonexistent"}, {"EGL_DEVICE_ID": "99"}],
+                         ids=["no driver", "no such device"])
 def test_no_context_names_the_debian_packages(environment):
     status, out, err = run(ERROR + ERROR, **environment)
     assert (status, err) == (0, "")
