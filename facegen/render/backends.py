@@ -29,6 +29,7 @@ class Backend(Protocol):
 _HOMES = {
     "soft": ("facegen.render.soft", "SoftBackend"),
     "fast": ("facegen.render.fast", "FastBackend"),
+    "gl": ("facegen.render.gl", "GlBackend"),
 }
 # Name -> the package without which it cannot be; the extra of facegen that brings it has the renderer's name.
 _NEEDS = {"fast": "numba"}
