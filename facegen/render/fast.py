@@ -127,7 +127,7 @@ class _Scratch:
     def __init__(self, n: int, m: int, lights: int) -> None:
         self.attributes = np.zeros((n, 4 + lights), np.float32)          # normal in camera axes, light shares
         self.vertex_ready, self.ready = np.empty(n, np.uint8), np.empty(m, np.uint8)
-        self.planes = np.empty((m, 14), np.float32)
+        self.planes = np.empty((m, 16), np.float32)
 
     def begin(self, light: NDArray[np.float32], normals: NDArray | None) -> None:
         self.attributes[:, 3:] = light
