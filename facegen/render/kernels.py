@@ -82,10 +82,14 @@ def project(vertices, cam, proj, snapped, depth):
 
 
 @njit(**OPTIONS)
-def bin_triangles(faces, snapped, depth, width, height, face_materials, inside, kind, first, last, starts):
-    """Fill kind (m,) with materials (``inside`` for back faces) and return the triangles of each band, in order."""
+def bin_triangles(faces, snapped, depth, width, height, face_materials, inside, kind, first, last, starts, columns):
+    """Fill kind (m,) with materials (``inside`` for back faces) and return the triangles of each band, in order.
+
+    columns (bands, 2): the first and the last block of four pixels that a band's triangles may touch.
+    """
     bands = len(starts) - 1
     starts[:] = 0
+    columns[:, 0], columns[:, 1] = width >> 2, -1
     for t in range(len(faces)):
         a, b, c = faces[t, 0], faces[t, 1], faces[t, 2]
         first[t], last[t] = 0, -1
@@ -103,6 +107,7 @@ def bin_triangles(faces, snapped, depth, width, height, face_materials, inside, 
         first[t], last[t] = top // BAND_ROWS, bottom // BAND_ROWS
         for band in range(first[t], last[t] + 1):
             starts[band + 1] += 1
+            columns[band, 0], columns[band, 1] = min(columns[band, 0], left >> 2), max(columns[band, 1], right >> 2)
     for band in range(bands):
         starts[band + 1] += starts[band]
     items = np.empty(starts[bands], np.int32)
@@ -153,8 +158,8 @@ _narrow, _wide = _rows(np.int32, np.int32), _rows(np.int64, _wrapped)
 
 
 @njit(**OPTIONS)
-def _scan(buffer, faces, snapped, depth, triangle, top, bottom, width, columns):
-    """Draw a triangle into the band's rows top..bottom; ``columns`` (2,) grows to the blocks touched.
+def _scan(buffer, faces, snapped, depth, triangle, top, bottom, width):
+    """Draw a triangle into the band's rows top..bottom.
 
     Corners are whole sub-pixels, so the edge functions are exact: with the top-left rule a sample on a shared edge
     belongs to one of its triangles.
@@ -172,8 +177,6 @@ def _scan(buffer, faces, snapped, depth, triangle, top, bottom, width, columns):
     left, right = max((low + 31) >> 8, 0) >> 2, min((high - 32) >> 8, width - 1) >> 2
     if first > last or left > right:
         return
-    columns[0], columns[1] = min(columns[0], left), max(columns[1], right)
-
     dx0, dy0, dx1, dy1, dx2, dy2 = xb - xa, yb - ya, xc - xb, yc - yb, xa - xc, ya - yc
     scale = 1.0 / area
     zx, zy = ((zc - za) * dy0 + (zb - za) * dy2) * -scale, ((zc - za) * dx0 + (zb - za) * dx2) * scale
@@ -216,34 +219,60 @@ def _angle(sine, cosine):
 
 
 @njit(**OPTIONS)
-def _normal(vertices, starts, ring, v):
-    """Return the unit normal of a vertex, world axes: its triangles' normals, each by its angle there."""
-    x, y, z = vertices[v, _P0], vertices[v, _P1], vertices[v, _P2]
-    nx = ny = nz = np.float32(0)
-    for k in range(np.uint64(starts[v]), np.uint64(starts[v + _P1])):
-        p, q = np.uint64(ring[k, _P0]), np.uint64(ring[k, _P1])
-        ax, ay, az = (np.float32(vertices[p, _P0] - x), np.float32(vertices[p, _P1] - y),
-                      np.float32(vertices[p, _P2] - z))
-        bx, by, bz = (np.float32(vertices[q, _P0] - x), np.float32(vertices[q, _P1] - y),
-                      np.float32(vertices[q, _P2] - z))
-        cx, cy, cz = ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
-        size = np.float32(math.sqrt(cx * cx + cy * cy + cz * cz))
-        weight = _angle(size, ax * bx + ay * by + az * bz) / max(size, np.float32(1e-30))
-        nx, ny, nz = nx + weight * cx, ny + weight * cy, nz + weight * cz
-    scale = np.float32(1) / max(np.float32(math.sqrt(nx * nx + ny * ny + nz * nz)), np.float32(1e-30))
-    return nx * scale, ny * scale, nz * scale
+def all_normals(vertices, faces, work, normals):
+    """Fill normals (n, 3) float32, world axes: the triangles' normals, each by its angle at the vertex.
+
+    work (6 * CHUNK,): two edges of each triangle of a chunk, which become its unit normal and its angles.
+    """
+    normals[:] = 0
+    m = np.uint64(len(faces))
+    for first in range(np.uint64(0), m, _CHUNK):
+        count = min(m - first, _CHUNK)
+        for i in range(count):
+            a, b, c = (np.uint64(faces[first + i, _P0]), np.uint64(faces[first + i, _P1]),
+                       np.uint64(faces[first + i, _P2]))
+            for k in range(_P3):
+                work[k * _CHUNK + i] = vertices[b, k] - vertices[a, k]
+                work[(_P3 + k) * _CHUNK + i] = vertices[c, k] - vertices[a, k]
+        for i in range(count):
+            ux, uy, uz = work[i], work[_CHUNK + i], work[_P2 * _CHUNK + i]
+            vx, vy, vz = work[_P3 * _CHUNK + i], work[_P4 * _CHUNK + i], work[_P5 * _CHUNK + i]
+            nx, ny, nz = uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
+            size = np.float32(math.sqrt(nx * nx + ny * ny + nz * nz))
+            uv = ux * vx + uy * vy + uz * vz
+            at_a = _angle(size, uv)
+            at_b = _angle(size, ux * ux + uy * uy + uz * uz - uv)
+            scale = np.float32(1) / max(size, np.float32(1e-30))
+            work[i], work[_CHUNK + i], work[_P2 * _CHUNK + i] = nx * scale, ny * scale, nz * scale
+            work[_P3 * _CHUNK + i], work[_P4 * _CHUNK + i] = at_a, at_b
+            work[_P5 * _CHUNK + i] = np.float32(math.pi) - at_a - at_b
+        for i in range(count):
+            for corner in range(_P3):
+                v = np.uint64(faces[first + i, corner])
+                weight = work[(_P3 + corner) * _CHUNK + i]
+                normals[v, _P0] += weight * work[i]
+                normals[v, _P1] += weight * work[_CHUNK + i]
+                normals[v, _P2] += weight * work[_P2 * _CHUNK + i]
+    for v in range(np.uint64(len(normals))):
+        nx, ny, nz = normals[v, _P0], normals[v, _P1], normals[v, _P2]
+        scale = np.float32(1) / max(np.float32(math.sqrt(nx * nx + ny * ny + nz * nz)), np.float32(1e-30))
+        normals[v, _P0], normals[v, _P1], normals[v, _P2] = nx * scale, ny * scale, nz * scale
 
 
 @njit(**OPTIONS)
-def all_normals(vertices, starts, ring, normals):
-    """Fill normals (n, 3) of all vertices, world axes."""
-    for v in range(np.uint64(len(vertices))):
-        normals[v, _P0], normals[v, _P1], normals[v, _P2] = _normal(vertices, starts, ring, v)
+def fill_attributes(normals, light, cam, attributes):
+    """Fill attributes (n, 4 + lights): the normal in camera axes, then the shares of light."""
+    shares = light.shape[1]
+    for v in range(np.uint64(len(attributes))):
+        attributes[v, _P0], attributes[v, _P1], attributes[v, _P2] = _turned(
+            cam, normals[v, _P0], normals[v, _P1], normals[v, _P2])
+        for k in range(np.uint64(shares)):
+            attributes[v, _P3 + k] = light[v, k]
 
 
 @njit(**OPTIONS)
-def _prepare(t, vertices, faces, proj, cam, flat, starts, ring, known, attributes, vertex_ready, planes, ready):
-    """Work out what shading asks of a triangle: corner weights as functions of the pixel, and normals.
+def _prepare(t, vertices, faces, proj, cam, flat, planes, ready):
+    """Work out what shading asks of a triangle that owns a pixel: its corners' weights as functions of the pixel.
 
     The functions are those of `shading._corner_weights`. planes (m, 16): nine coefficients, the origin's x and y,
     and for flat shading the normal.
@@ -272,13 +301,6 @@ def _prepare(t, vertices, faces, proj, cam, flat, starts, ring, known, attribute
                       vertices[c, _P2] - vertices[a, _P2])
         planes[t, _P11], planes[t, _P12], planes[t, _P13] = _turned(
             cam, uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx)
-    elif not known:
-        for corner in range(_P3):
-            v = np.uint64(faces[t, corner])
-            if not vertex_ready[v]:
-                nx, ny, nz = _normal(vertices, starts, ring, v)
-                attributes[v, _P0], attributes[v, _P1], attributes[v, _P2] = _turned(cam, nx, ny, nz)
-                vertex_ready[v] = 1
     ready[t] = 1
 
 
@@ -412,15 +434,14 @@ def _light(count, look, lamps, sky, view, work):
 
 
 @njit(**OPTIONS)
-def draw_bands(start, stop, step, items, starts, vertices, faces, proj, snapped, depth, kind, inside, cam, flat, known,
-               adjacency, ring, attributes, vertex_ready, planes, ready, material, lamps, sky, view, powers,
-               encode, behind, transparent, picture):
+def draw_bands(start, stop, step, items, starts, columns, vertices, faces, proj, snapped, depth, kind, inside, cam,
+               flat, attributes, planes, ready, material, lamps, sky, view, powers, encode, behind, transparent,
+               picture):
     """Draw the bands start, start + step, ... before stop over picture (h, w) uint32, which holds the background."""
     height, width = picture.shape
     row_blocks = (width + 3) >> 2
     buffer = np.empty(BAND_ROWS * row_blocks * _ROW_BLOCK, np.int32)
     colour = np.empty(BAND_ROWS * row_blocks * 16, np.float32)             # r, g, b, cover of each pixel
-    columns = np.empty(2, np.int64)
     kinds = len(material)
     entry, target = np.empty((kinds, CHUNK), np.int32), np.empty((kinds, CHUNK), np.int32)
     filled = np.zeros(kinds, np.int64)
@@ -429,13 +450,13 @@ def draw_bands(start, stop, step, items, starts, vertices, faces, proj, snapped,
         if starts[band] == starts[band + 1]:
             continue
         top, bottom = band * BAND_ROWS, min((band + 1) * BAND_ROWS, height)
-        buffer[:] = 0
-        columns[0], columns[1] = row_blocks, -1
+        left, right = columns[band, 0], columns[band, 1] + 1
+        for row in range(0, row_blocks * (bottom - top), row_blocks):
+            buffer[_ROW_BLOCK * (row + left):_ROW_BLOCK * (row + right)] = 0
+            colour[16 * (row + left):16 * (row + right)] = 0
         for k in range(starts[band], starts[band + 1]):
-            _scan(buffer, faces, snapped, depth, items[k], top, bottom, width, columns)
-        left, right = 4 * columns[0], min(4 * columns[1] + 4, width)
-        for row in range(bottom - top):
-            colour[16 * row_blocks * row + 4 * left:16 * row_blocks * row + 4 * right] = 0
+            _scan(buffer, faces, snapped, depth, items[k], top, bottom, width)
+        left, right = 4 * left, min(4 * right, width)
         for row in range(bottom - top):
             for x in range(left, right):
                 p = np.uint64((row * row_blocks + (x >> 2)) * _ROW_BLOCK + 4 * (x & 3))
@@ -463,8 +484,7 @@ def draw_bands(start, stop, step, items, starts, vertices, faces, proj, snapped,
                     entry[own, n], target[own, n] = t, (row << _ROW_SHIFT) + (x << 4) + mask
                     filled[own] = n + _P1
                     if not ready[np.uint64(t)]:
-                        _prepare(t, vertices, faces, proj, cam, flat, adjacency, ring, known, attributes,
-                                 vertex_ready, planes, ready)
+                        _prepare(t, vertices, faces, proj, cam, flat, planes, ready)
                     if n + _P1 == _CHUNK:
                         _flush(own, filled, entry, target, top, row_blocks, work, faces, attributes, planes,
                                material, flat, inside, powers, lamps, sky, view, colour)
