@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from facegen.facs.tables import load_expressions, load_person, load_units
     from facegen.fileio.images import contact_sheet, save_image
     from facegen.geometry.mesh import Mesh
-    from facegen.render import Renderer, render, render_passes
+    from facegen.render import Renderer, render, render_passes, save_passes
 
 __version__ = "0.1.0"
 
@@ -57,6 +57,7 @@ __all__ = [
     "render_passes",
     "resolve",
     "save_image",
+    "save_passes",
 ]
 
 # Where each name lives. Read on first use (PEP 562), so that `import facegen` costs nothing.
@@ -71,6 +72,7 @@ _HOMES = {
     "facegen.fileio.images": ("contact_sheet", "save_image"),
     "facegen.geometry.mesh": ("Mesh",),
     "facegen.render.passes": ("render_passes",),
+    "facegen.render.passfiles": ("save_passes",),
     "facegen.render.render": ("Renderer",),
     "facegen": ("render",),                 # the package itself: calling it draws
 }

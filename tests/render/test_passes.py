@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import json
+
 import numpy as np
 import pytest
+from PIL import Image
 from shapes import box, sphere
 
 from facegen import load_face
-from facegen.errors import InputError
+from facegen.errors import FileError, InputError
 from facegen.geometry.mesh import Mesh, merge
-from facegen.render import PASSES, render, render_passes
+from facegen.render import PASSES, render, render_passes, save_passes
 from facegen.render.passes import ARRAY_PASSES
 
 BALL = sphere()
@@ -222,3 +225,89 @@ def test_wrong_wishes_are_named_at_the_door(call, message):
 
 def test_all_names_are_offered():
     assert PASSES == ("depth", "normal", "part", "material", "triangle", "landmarks", "feature_points")
+
+
+def saved(tmp_path, **options):
+    found = render_passes(load_face(), "surprise", passes=(*ARRAY_PASSES, "feature_points"), size=(72, 64), detail=0,
+                          **options)
+    return found, save_passes(found, tmp_path / "smile", exact=True)
+
+
+@pytest.mark.parametrize("orthographic", [False, True])
+def test_files_give_back_what_was_saved(tmp_path, orthographic):
+    found, paths = saved(tmp_path, orthographic=orthographic, view=(20, 10))
+    assert sorted(p.name for p in tmp_path.iterdir()) == sorted(p.name for p in paths.values()) == sorted([
+        *(f"smile.{name}.png" for name in ARRAY_PASSES), "smile.feature_points.json", "smile.passes.json",
+        "smile.passes.npz"])
+    about = json.loads(paths["passes"].read_text())
+    pictures = {name: Image.open(paths[name]) for name in ARRAY_PASSES}
+
+    raw, depth = np.asarray(pictures["depth"]).astype(float), found["depth"]
+    assert raw.max() == 65535
+    np.testing.assert_array_equal(raw == 0, np.isinf(depth))
+    measured = about["depth"]["offset"] + about["depth"]["step"] * raw
+    np.testing.assert_allclose(measured[raw > 0], depth[raw > 0], atol=0.51 * about["depth"]["step"] + 1e-4)
+
+    raw = np.asarray(pictures["normal"])
+    seen = np.isfinite(depth)
+    assert (raw[~seen] == 0).all()
+    np.testing.assert_allclose(raw[seen] / 127.5 - 1, found["normal"][seen], atol=0.0041)
+
+    for name, names in (("part", found.parts), ("material", found.materials)):
+        assert pictures[name].mode == "P"
+        np.testing.assert_array_equal(np.asarray(pictures[name]), found[name])
+        labels = about[name]["labels"]
+        assert [labels[label]["value"] for label in ("nothing", *names)] == list(range(len(names) + 1))
+        assert len({tuple(label["colour"]) for label in labels.values()}) == len(labels)
+        row, column = np.argwhere(found[name] == 1)[0]
+        assert pictures[name].convert("RGB").getpixel((int(column), int(row))) == tuple(labels[names[0]]["colour"])
+
+    raw = np.asarray(pictures["triangle"]).astype(int)
+    np.testing.assert_array_equal(raw @ [1, 256, 65536] - 1, found["triangle"])
+
+    points = json.loads(paths["feature_points"].read_text())
+    assert tuple(points) == found["feature_points"].names
+    np.testing.assert_allclose([p["xy"] for p in points.values()], found["feature_points"].xy, atol=1e-3)
+    assert [p["visible"] for p in points.values()] == found["feature_points"].visible.tolist()
+    # The camera as data projects the places to where the points are.
+    camera = about["camera"]
+    local = np.array([[*p["place"], 1] for p in points.values()]) @ np.array(camera["world_to_camera"]).T
+    zoom = camera["scale"] if orthographic else camera["focal"] / -local[:, 2]
+    np.testing.assert_allclose(camera["centre"][0] + zoom * local[:, 0], found["feature_points"].xy[:, 0], atol=1e-3)
+    np.testing.assert_allclose(camera["centre"][1] - zoom * local[:, 1], found["feature_points"].xy[:, 1], atol=1e-3)
+    np.testing.assert_allclose(-local[:, 2], found["feature_points"].depth, atol=1e-3)
+
+    with np.load(paths["arrays"]) as arrays:
+        for name in ARRAY_PASSES:
+            np.testing.assert_array_equal(arrays[name], found[name])
+        np.testing.assert_array_equal(arrays["feature_points_xy"], found["feature_points"].xy)
+
+
+def test_an_empty_view_is_saved_too(tmp_path):
+    camera = render_passes(BALL, size=64).camera
+    away = render_passes(BALL, BALL.vertices + np.array([0, 1000.0, 0]), camera=camera)
+    paths = save_passes(away, tmp_path)
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["depth.png", "normal.png", "part.png", "passes.json"]
+    assert (np.asarray(Image.open(paths["depth"])) == 0).all()
+
+
+def test_what_cannot_be_saved_is_said_and_nothing_is_harmed(tmp_path, monkeypatch):
+    with pytest.raises(InputError, match=r"^passes: expected what render_passes returned, got a dict"):
+        save_passes({}, tmp_path / "a")
+    found = render_passes(BALL, size=32, passes=["depth"])
+    with pytest.raises(FileError, match=r"the folder .*nowhere does not exist"):
+        save_passes(found, tmp_path / "nowhere" / "a")
+    (tmp_path / "a.depth.png").mkdir()
+    with pytest.raises(FileError, match="is a folder"):
+        save_passes(found, tmp_path / "a")
+    old = tmp_path / "b.depth.png"
+    old.write_bytes(b"precious")
+
+    def full(*_, **__):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(Image.Image, "save", full)
+    with pytest.raises(FileError, match="depth pass cannot be written: No space left"):
+        save_passes(found, tmp_path / "b")
+    assert old.read_bytes() == b"precious"
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["a.depth.png", "b.depth.png"]
