@@ -27,7 +27,7 @@ from facegen.facs.deformation import Deformation
 from facegen.facs.expressions import Resolution, resolve
 from facegen.geometry.mesh import Mesh, merge
 from facegen.geometry.normals import vertex_normals
-from facegen.geometry.subdivision import loop_once
+from facegen.geometry.subdivision import inherited_sides, loop_once
 
 MAX_DETAIL = 3
 """Finest subdivision level; every level samples the surface of this one."""
@@ -95,6 +95,17 @@ class Face:
             raise InputError(f"vertices: expected shape {(points.shape[1], 3)} at detail {detail}, "
                              f"got {vertices.shape}")
         return dict(zip(self._data.point_names, points @ vertices, strict=True))
+
+    def cage_sides(self, detail: int = 2) -> NDArray[np.bool_]:
+        """Return which sides (m, 3) of the triangles of ``mesh(detail)`` run along the cage's edges.
+
+        Side k runs from corner k to the next. Parts beside the skin have no cage: none of theirs does.
+        """
+        sides = np.ones(self._data.faces.shape, bool)
+        mesh = self.mesh(detail)
+        for _ in range(detail):
+            sides = inherited_sides(sides)
+        return np.concatenate([sides, np.zeros((len(mesh.faces) - len(sides), 3), bool)])
 
     @property
     def regions(self) -> tuple[tuple[str, str, str], ...]:

@@ -26,6 +26,7 @@ from facegen.render.occlusion import (
 from facegen.render.request import Look
 from facegen.render.scene import Scene
 from facegen.render.shading import CAVITY, DARKEST, light_directions, material_rows, srgb_table, to_srgb, unit
+from facegen.render.shadow import with_shadows
 from facegen.render.soft import background_rows
 
 # Steps of the table for a power of openness; linear between them.
@@ -84,6 +85,8 @@ class FastBackend:
         if self.look.occlusion == "posed":
             light, normals = self._baked(vertices)
             normals = normals @ self.camera.rotation.T
+        if self.look.shadows:
+            light = with_shadows(light, self.neutral.with_vertices(vertices), self.camera, self.scene)
         picture = self._blank.copy()
 
         def bands(thread: int) -> None:

@@ -18,7 +18,15 @@ from facegen.errors import InputError
 from facegen.geometry.camera import Camera, check_view, frame
 from facegen.geometry.mesh import Mesh
 from facegen.geometry.normals import face_normals, vertex_normals
-from facegen.render.request import SHADINGS, Rig, check_choice, check_size, neutral_mesh, posed_vertices
+from facegen.render.request import (
+    SHADINGS,
+    Rig,
+    check_choice,
+    check_in_front,
+    check_size,
+    neutral_mesh,
+    posed_vertices,
+)
 from facegen.render.soft import nearness_points
 from facegen.render.zbuffer import prepare, scan
 
@@ -99,6 +107,7 @@ def render_passes(thing: Mesh | Rig, pose: Any = None, *, passes: Sequence[str] 
         _check_possible(name, thing, mesh)
     vertices = posed_vertices(thing, pose, mesh, level, person=person, intensity=intensity)
     camera = camera or frame(mesh.vertices, vertices, size=size, view=view, orthographic=orthographic)
+    check_in_front("pose", vertices, mesh.faces, camera)
     posed = mesh.with_vertices(vertices)
     found = Passes(camera, posed)
     arrays = _arrays(posed, camera, [name for name in wanted if name in _EMPTY], flat=shading == "flat")
