@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from facegen.facs.tables import load_expressions, load_person, load_units
     from facegen.fileio.images import contact_sheet, save_image
     from facegen.geometry.mesh import Mesh
-    from facegen.render import Renderer, render
+    from facegen.render import Renderer, Wireframe, render, render_passes, save_passes
 
 __version__ = "0.1.0"
 
@@ -42,6 +42,7 @@ __all__ = [
     "Renderer",
     "Resolution",
     "TableError",
+    "Wireframe",
     "canonical",
     "contact_sheet",
     "face_names",
@@ -54,8 +55,10 @@ __all__ = [
     "people",
     "presets",
     "render",
+    "render_passes",
     "resolve",
     "save_image",
+    "save_passes",
 ]
 
 # Where each name lives. Read on first use (PEP 562), so that `import facegen` costs nothing.
@@ -69,6 +72,9 @@ _HOMES = {
     "facegen.facs.tables": ("load_expressions", "load_person", "load_units"),
     "facegen.fileio.images": ("contact_sheet", "save_image"),
     "facegen.geometry.mesh": ("Mesh",),
+    "facegen.render.overlay": ("Wireframe",),
+    "facegen.render.passes": ("render_passes",),
+    "facegen.render.passfiles": ("save_passes",),
     "facegen.render.render": ("Renderer",),
     "facegen": ("render",),                 # the package itself: calling it draws
 }

@@ -26,6 +26,7 @@ from facegen.render.occlusion import (
 from facegen.render.request import Look
 from facegen.render.scene import Scene
 from facegen.render.shading import CAVITY, DARKEST, light_directions, material_rows, srgb_table, to_srgb, unit
+from facegen.render.shadow import with_shadows
 from facegen.render.soft import background_rows
 
 # Steps of the table for a power of openness; linear between them.
@@ -85,6 +86,8 @@ class FastBackend:
         light = self._baked(vertices) if self.look.occlusion == "posed" else self._light
         if not (self.look.flat or self.look.occlusion == "posed"):
             kernels.all_normals(vertices, self._faces, self._work, self._normals)
+        if self.look.shadows:
+            light = with_shadows(light, self.neutral.with_vertices(vertices), self.camera, self.scene)
         kernels.fill_attributes(self._normals, light, self._cam, self._attributes)
         picture = self._blank.copy()
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -12,6 +14,7 @@ from facegen.render.occlusion import visibility
 from facegen.render.request import Look
 from facegen.render.scene import Scene
 from facegen.render.shading import from_srgb, shade, surface, to_srgb
+from facegen.render.shadow import with_shadows
 from facegen.render.zbuffer import prepare, scan
 
 # Samples held at once: the picture is drawn in bands, so that its size does not decide the memory.
@@ -33,6 +36,8 @@ class SoftBackend:
         seen = None if baked is None else visibility(baked)
         normals = None if baked is None or baked is mesh else vertex_normals(baked.vertices, baked.faces)
         prepared = surface(mesh, camera, scene, flat=look.flat, seen=seen, seen_normals=normals)
+        if look.shadows:
+            prepared = replace(prepared, light=with_shadows(prepared.light, mesh, camera, scene))
         width, height = camera.width, camera.height
         triangles = prepare(nearness_points(mesh.vertices, camera), mesh.faces, width=width, height=height, samples=4)
         picture = np.empty((height, width, 4), np.uint8)

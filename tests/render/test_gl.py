@@ -109,15 +109,6 @@ def test_inner_sides_unknown_materials_and_other_lights():
         check_same(*pair(mesh, None, view=(20, 30), size=128, scene=scene))
 
 
-def test_a_camera_inside_the_mesh_draws_without_trouble():
-    ball = sphere()
-    camera = frame(ball.vertices * 0.2, size=(64, 64))
-    pixels = render(merge([ball, sphere(radius=5, part="around")]), camera=camera, renderer="gl")
-    assert len(np.unique(pixels.reshape(-1, 4), axis=0)) > 20
-    behind = ball.with_vertices(ball.vertices + np.array([0, 0, 1000]))
-    assert (render(behind, camera=camera, background="transparent", renderer="gl") == 0).all()
-
-
 def test_a_vertex_of_several_materials_is_uploaded_once_for_each(face):
     mesh = face.mesh(0)
     corners, faces, material = gl._expanded(mesh, False)

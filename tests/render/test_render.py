@@ -195,14 +195,6 @@ def test_wide_tall_and_large_pictures():
     np.testing.assert_array_equal(np.diff(column), 1)
 
 
-def test_a_camera_inside_the_mesh_draws_without_trouble():
-    camera = frame(BALL.vertices * 0.2, size=(64, 64))
-    pixels = render(merge([BALL, sphere(radius=5, part="around")]), camera=camera)
-    assert pixels.shape == (64, 64, 4)
-    behind = BALL.with_vertices(BALL.vertices + np.array([0, 0, 1000]))
-    assert (render(behind, camera=camera, background="transparent")[..., 3] == 0).all()
-
-
 def nan_ball():
     vertices = BALL.vertices.copy()
     vertices[7, 1] = np.nan
