@@ -17,7 +17,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from facegen.errors import FacegenError, FileError, InputError, NotationError, TableError
+    from facegen.errors import FacegenError, FileError, InputError, JobError, NotationError, TableError
     from facegen.face.face import Controls, Face, face_names, load_face
     from facegen.facs.deformation import Deformation, load_deformation
     from facegen.facs.expression_table import people
@@ -37,6 +37,7 @@ __all__ = [
     "FacegenError",
     "FileError",
     "InputError",
+    "JobError",
     "Mesh",
     "NotationError",
     "Renderer",
@@ -60,7 +61,7 @@ __all__ = [
 
 # Where each name lives. Read on first use (PEP 562), so that `import facegen` costs nothing.
 _HOMES = {
-    "facegen.errors": ("FacegenError", "FileError", "InputError", "NotationError", "TableError"),
+    "facegen.errors": ("FacegenError", "FileError", "InputError", "JobError", "NotationError", "TableError"),
     "facegen.face.face": ("Controls", "Face", "face_names", "load_face"),
     "facegen.facs.deformation": ("Deformation", "load_deformation"),
     "facegen.facs.expression_table": ("people",),

@@ -11,7 +11,7 @@ import typer
 
 from facegen import __version__
 from facegen.cli import explain, figures, gallery, listing, picture
-from facegen.errors import FacegenError
+from facegen.errors import FacegenError, InputError
 
 DONE, STOPPED, WRONG = 0, 1, 2
 
@@ -57,7 +57,7 @@ def run(argv: Sequence[str] | None = None) -> int:
         sys.stdout.flush()
         return code if isinstance(code, int) else DONE
     except FacegenError as error:
-        return _say(str(error), WRONG)
+        return _say(str(error), WRONG if isinstance(error, InputError) else STOPPED)
     except _CommandLineError as error:
         context = getattr(error, "ctx", None)
         hint = f" ({context.command_path} --help explains)" if context else ""

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from facegen.errors import FileError
@@ -25,6 +25,18 @@ def whole_file(path: Path, what: str = "") -> Iterator[Path]:
             draft.unlink(missing_ok=True)
     except OSError as error:
         raise FileError(f"{path}: {what}cannot be written: {error.strerror or error}") from error
+
+
+def remove_drafts(paths: Iterable[Path]) -> None:
+    """Remove what a killed process left beside ``paths``: drafts that were never renamed."""
+    folders: dict[Path, set[str]] = {}
+    for path in paths:
+        folders.setdefault(path.parent, set()).add(path.name)
+    for folder, names in folders.items():
+        for draft in folder.glob(".*.part"):
+            if draft.name[1:].rsplit(".", 2)[0] in names:
+                with suppress(OSError):
+                    draft.unlink()
 
 
 def save_text(text: str, path: str | os.PathLike[str]) -> Path:
