@@ -16,7 +16,8 @@ def whole_file(path: Path, what: str = "") -> Iterator[Path]:
 
     An existing file is replaced whole or stays as it was. ``what`` goes before "cannot be written".
     """
-    draft = path.with_name(f".{path.name}.{os.getpid()}.part")
+    # A name of its own: threads, and machines that share the folder, may write the same file at once.
+    draft = path.with_name(f".{path.name}.{os.urandom(4).hex()}.part")
     try:
         try:
             yield draft
