@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from facegen.facs.tables import load_expressions, load_person, load_units
     from facegen.fileio.images import contact_sheet, save_image
     from facegen.geometry.mesh import Mesh
-    from facegen.render import Renderer, render
+    from facegen.render import Renderer, render, render_passes
 
 __version__ = "0.1.0"
 
@@ -55,6 +55,7 @@ __all__ = [
     "people",
     "presets",
     "render",
+    "render_passes",
     "resolve",
     "save_image",
 ]
@@ -70,6 +71,7 @@ _HOMES = {
     "facegen.facs.tables": ("load_expressions", "load_person", "load_units"),
     "facegen.fileio.images": ("contact_sheet", "save_image"),
     "facegen.geometry.mesh": ("Mesh",),
+    "facegen.render.passes": ("render_passes",),
     "facegen.render.render": ("Renderer",),
     "facegen": ("render",),                 # the package itself: calling it draws
 }

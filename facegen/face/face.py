@@ -18,6 +18,7 @@ from scipy import sparse
 
 from facegen.data import meshes_dir
 from facegen.errors import InputError, nearest
+from facegen.face.attach import attach
 from facegen.face.deformer import Array, Deformer
 from facegen.face.eye import eyeball_radius
 from facegen.face.folds import fold_field
@@ -64,6 +65,7 @@ class _Level:
     lid_vertices: tuple[NDArray[np.int64], ...]
     folds: Array                        # (f, n_surface, 3) displacement at amount one
     head_weight: Array                  # (n, 1)
+    points: sparse.csr_array            # feature points on the surface, from the vertices
 
 
 class Face:
@@ -80,6 +82,19 @@ class Face:
     def feature_points(self) -> dict[str, Array]:
         """Name -> neutral place (3,), mm, of every feature point."""
         return dict(zip(self._data.point_names, self.deformer.points, strict=True))
+
+    def feature_point_places(self, vertices: Array, *, detail: int = 2) -> dict[str, Array]:
+        """Return name -> place (3,), mm, of every feature point on a posed surface.
+
+        ``vertices`` (n, 3) of ``mesh(detail)``, such as :meth:`pose` gives. A feature point is a vertex of the cage;
+        the smooth surface runs a little inside the cage, and this is the place on the surface that belongs to it.
+        """
+        points = self._level(detail).points
+        vertices = np.asarray(vertices, dtype=np.float64)
+        if vertices.shape != (points.shape[1], 3):
+            raise InputError(f"vertices: expected shape {(points.shape[1], 3)} at detail {detail}, "
+                             f"got {vertices.shape}")
+        return dict(zip(self._data.point_names, points @ vertices, strict=True))
 
     @property
     def regions(self) -> tuple[tuple[str, str, str], ...]:
@@ -270,7 +285,21 @@ class Face:
         mesh = merge([skin, *(a.mesh for a in d.attachments)])
         normals = vertex_normals(neutral, faces)
         folds = np.array([fold_field(f, neutral, normals) for f in d.folds.values()]).reshape(len(d.folds), n, 3)
-        return _Level(matrix, mesh, tuple(lids), folds, d.head_weight(mesh.vertices))
+        return _Level(matrix, mesh, tuple(lids), folds, d.head_weight(mesh.vertices), self._points_on(mesh))
+
+    def _points_on(self, mesh: Mesh) -> sparse.csr_array:
+        """Return the weights (k, n) of a mesh's vertices that place the feature points on its surface."""
+        d = self._data
+        weights = sparse.lil_array((len(d.point_names), len(mesh.vertices)))
+        for row, (vertex, part) in enumerate(zip(d.point_vertices, d.point_parts, strict=True)):
+            if vertex >= 0:             # vertices of the cage keep their index at every level
+                weights[row, vertex] = 1.0
+            else:
+                faces = mesh.faces[mesh.face_parts == mesh.parts.index(part or "skin")]
+                near = attach(self.deformer.points[[row]], mesh.vertices, faces,
+                              sparse.csr_array(sparse.identity(len(mesh.vertices), format="csr")))
+                weights[row, near.indices] = near.data
+        return sparse.csr_array(weights)
 
 
 @cache

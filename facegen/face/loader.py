@@ -43,6 +43,8 @@ class FaceData:
     corners: NDArray[np.int32]
     point_names: tuple[str, ...]
     point_index: Mapping[str, int]
+    point_vertices: NDArray[np.int32]       # (k,) the cage's vertex that each point is, -1 for one set apart
+    point_parts: tuple[str | None, ...]     # the part that a point belongs to, None for the skin
     point_scale: Array
     scales: Mapping[str, Array]
     regions: tuple[Region, ...]
@@ -84,14 +86,15 @@ def read_face(path: Path) -> FaceData:
     jaw = Jaw(place(jaw_fields["hinge"]), place(jaw_fields["glide"]), rule)
     names: list[str] = []
     takes_input: list[bool] = []
-    places, point_scale, jaw_share, aliases, with_parts = [], [], [], {}, {}
+    places, point_scale, jaw_share, point_vertices, aliases, with_parts = [], [], [], [], {}, {}
     for name, entry in top["points"].items():
         fields = entry.fields(required=("role", "scale"), optional=("vertex", "at", "jaw", "paper", "part"))
         if ("vertex" in fields) == ("at" in fields):
             raise entry.fail("a feature point needs either vertex or at")
         role = fields["role"].choice(ROLES, "role")
         takes_input.append(role == "input" or (role == "jaw" and rule == "vertices"))
-        places.append(cage.vertices[index(fields["vertex"])] if "vertex" in fields else place(fields["at"]))
+        point_vertices.append(index(fields["vertex"]) if "vertex" in fields else -1)
+        places.append(place(fields["at"]) if "at" in fields else cage.vertices[point_vertices[-1]])
         point_scale.append(scales[fields["scale"].choice(scales, "scale")])
         jaw_share.append(fields["jaw"].number(0, 1) if "jaw" in fields else 0.0)
         for key, rows in (("paper", aliases), ("part", with_parts)):
@@ -177,6 +180,7 @@ def read_face(path: Path) -> FaceData:
     for part, row in with_parts.items():
         if part not in parts:
             Entry(part, str(path), f"points.{names[row]}.part").choice(parts, "part")
+    part_of = {row: part for part, row in with_parts.items()}
     folds = {}
     for name, entry in top["folds"].items() if "folds" in top else ():
         fields = entry.fields(required=("along", "width", "depth", "ridge", "toward"))
@@ -193,7 +197,8 @@ def read_face(path: Path) -> FaceData:
             follow[i] = [e.number() for e in _some(entry, 2, expected)]
     return FaceData(
         top["name"].text(), top["source"].text(), deformer, cage.faces, cage.materials, cage.face_materials,
-        creases, corners, tuple(names), {**aliases, **at}, np.array(point_scale), scales, tuple(regions),
+        creases, corners, tuple(names), {**aliases, **at}, np.array(point_vertices),
+        tuple(part_of.get(row) for row in range(len(names))), np.array(point_scale), scales, tuple(regions),
         np.array(list(eyes.values())), tuple(rims), tuple(lid_skin), follow,
         place(head["pivot"]), head_weight,
         top["head_half_height"].number(1e-6) if "head_half_height" in top

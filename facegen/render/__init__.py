@@ -4,9 +4,10 @@ import sys
 from types import ModuleType
 
 from facegen.render.backends import RENDERERS
+from facegen.render.passes import PASSES, render_passes
 from facegen.render.render import Renderer, render
 
-__all__ = ["RENDERERS", "Renderer", "render"]
+__all__ = ["PASSES", "RENDERERS", "Renderer", "render", "render_passes"]
 
 
 class _Callable(ModuleType):
