@@ -23,7 +23,10 @@ class Backend(Protocol):
 
 
 # Name -> where it lives. Imported when asked for: two of them need packages that not everybody has.
-_HOMES = {"soft": ("facegen.render.soft", "SoftBackend")}
+_HOMES = {
+    "soft": ("facegen.render.soft", "SoftBackend"),
+    "fast": ("facegen.render.fast", "FastBackend"),
+}
 
 RENDERERS = ("auto", *_HOMES)
 

@@ -20,18 +20,18 @@ from facegen.render.scene import CLAY, INSIDE, Material, Scene
 
 # Linear brightness above which the tone curve bends, so that highlights keep their colour and never clip
 # flat.
-_SHOULDER = 0.72
+SHOULDER = 0.72
 # Openness of the darkest cavity: because some light always scatters in, and black has no shape.
-_DARKEST = 0.05
+DARKEST = 0.05
 # Openness of every inner side: dim, so that an open mouth or neck is dark but keeps its colour.
-_INSIDE_LIGHT = 0.45
+INSIDE_LIGHT = 0.45
 # Cavities darker than their openness alone: the bake's grid cannot see folds finer than its cells.
-_CAVITY = 1.3
+CAVITY = 1.3
 # Share of the light that bounces on inside a cavity.
-_BOUNCE = 0.6
+BOUNCE = 0.6
 # The catch-light is the mirror image of a round window: full within, gone beyond these cosines of normal
 # and half vector (5 and 7.5 degrees, a disc of about two millimetres on a cornea).
-_WINDOW_FULL, _WINDOW_GONE = 0.9962, 0.9914
+WINDOW_FULL, WINDOW_GONE = 0.9962, 0.9914
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,20 +69,27 @@ def surface(mesh: Mesh, camera: Camera, scene: Scene, *, flat: bool = False,
     light = np.ones((len(mesh.vertices), 1 + len(scene.lights)), np.float32)
     if seen is not None:
         baked = smooth if seen_normals is None else seen_normals
-        towards = np.array([_direction(lamp.towards) for lamp in scene.lights]) @ camera.rotation
+        towards = light_directions(scene) @ camera.rotation
         spreads = np.array([lamp.spread for lamp in scene.lights])
         light = light_shares(seen, baked, mesh.faces, towards, spreads)
     planes, origin, back = _corner_weights(mesh, camera)
-    looks: list[Material] = [scene.materials.get(name, CLAY) for name in mesh.materials] + [INSIDE]
     material = np.where(back, len(mesh.materials), mesh.face_materials).astype(np.int32)
-    return Surface(
-        mesh.faces, (normals @ camera.rotation.T).astype(np.float32), flat, light, planes, origin, back,
-        material,
-        np.array([[_linear(c) for c in look.albedo] for look in looks], np.float32),
-        np.array([look.wrap for look in looks], np.float32),
-        np.array([(look.specular, look.shininess, look.catch, look.lift) for look in looks],
-                 np.float32),
-    )
+    rows = material_rows(mesh, scene)
+    return Surface(mesh.faces, (normals @ camera.rotation.T).astype(np.float32), flat, light, planes, origin, back,
+                   material, rows[:, :3], rows[:, 3:6], rows[:, 6:])
+
+
+def material_rows(mesh: Mesh, scene: Scene) -> NDArray[np.float32]:
+    """Return (k + 1, 10): albedo (linear), wrap, specular, shininess, catch and lift of each of the mesh's materials,
+    and of the inside last."""
+    looks: list[Material] = [scene.materials.get(name, CLAY) for name in mesh.materials] + [INSIDE]
+    return np.array([(*from_srgb(look.albedo), *look.wrap, look.specular, look.shininess, look.catch, look.lift)
+                     for look in looks], np.float32)
+
+
+def light_directions(scene: Scene) -> NDArray[np.float64]:
+    """Return unit vectors (k, 3) to the lights, camera axes."""
+    return np.array([unit(lamp.towards) for lamp in scene.lights]).reshape(-1, 3)
 
 
 def shade(surface: Surface, camera: Camera, scene: Scene, ids: NDArray, x: NDArray, y: NDArray
@@ -106,17 +113,17 @@ def shade(surface: Surface, camera: Camera, scene: Scene, ids: NDArray, x: NDArr
 
     # Ambient: sky above, ground below; light that bounces in a cavity returns coloured: E = a / (1 - c (1 -
     # a)).
-    free = np.float32(_DARKEST) + np.float32(1 - _DARKEST) * light[0] ** np.float32(_CAVITY)
-    free = np.where(inside, np.float32(_INSIDE_LIGHT), free)
+    free = np.float32(DARKEST) + np.float32(1 - DARKEST) * light[0] ** np.float32(CAVITY)
+    free = np.where(inside, np.float32(INSIDE_LIGHT), free)
     up = 0.5 + 0.5 * normal[1]
     colour = np.empty((3, len(ids)), np.float32)
     for c in range(3):
         ambient = np.float32(scene.ground[c]) + np.float32(scene.sky[c] - scene.ground[c]) * up
-        colour[c] = ambient * free / (1 - np.float32(_BOUNCE) * albedo[c] * (1 - free))
+        colour[c] = ambient * free / (1 - np.float32(BOUNCE) * albedo[c] * (1 - free))
 
     shine = np.zeros((3, len(ids)), np.float32)
     for k, lamp in enumerate(scene.lights):
-        towards = _direction(lamp.towards).astype(np.float32)
+        towards = unit(lamp.towards).astype(np.float32)
         facing = towards @ normal
         reach = np.where(inside, np.float32(0), light[1 + k])
         half = viewer + towards[:, None]
@@ -135,16 +142,16 @@ def _catch_light(normal: NDArray, viewer: NDArray, scene: Scene, catch: NDArray)
     """Return the window mirrored in wet eyes, (k,)."""
     bright = np.zeros_like(catch)
     wet = np.flatnonzero(catch)
-    half = viewer[:, wet] + _direction(scene.window).astype(np.float32)[:, None]
+    half = viewer[:, wet] + unit(scene.window).astype(np.float32)[:, None]
     half /= np.sqrt((half * half).sum(axis=0))
     cosine = (half * normal[:, wet]).sum(axis=0)
-    bright[wet] = catch[wet] * np.clip((cosine - _WINDOW_GONE) / (_WINDOW_FULL - _WINDOW_GONE), 0, 1)
+    bright[wet] = catch[wet] * np.clip((cosine - WINDOW_GONE) / (WINDOW_FULL - WINDOW_GONE), 0, 1)
     return bright
 
 
 def to_srgb(linear: NDArray) -> NDArray[np.uint8]:
     """Return 8-bit sRGB of linear values 0..1, through a table."""
-    table = _srgb_table()
+    table = srgb_table()
     return table[(np.clip(linear, 0, 1) * np.float32(len(table) - 1) + np.float32(0.5)).astype(np.intp)]
 
 
@@ -182,16 +189,17 @@ def _corner_weights(mesh: Mesh, camera: Camera) -> tuple[NDArray[np.float32], ND
     return planes.astype(np.float32), origin, volume > 0
 
 
-def _direction(vector: tuple[float, float, float]) -> NDArray[np.float64]:
+def unit(vector: tuple[float, float, float]) -> NDArray[np.float64]:
+    """Return the vector at length one."""
     vector = np.asarray(vector, dtype=np.float64)
     return vector / np.sqrt(vector @ vector)
 
 
 def _tone(linear: NDArray[np.float32]) -> NDArray[np.float32]:
     """Return linear light with a soft shoulder: unchanged up to it, then towards 1 with the same slope."""
-    room = np.float32(1 - _SHOULDER)
-    above = np.maximum(linear - np.float32(_SHOULDER), 0)
-    return np.minimum(linear, np.float32(_SHOULDER)) + above * room / (above + room)
+    room = np.float32(1 - SHOULDER)
+    above = np.maximum(linear - np.float32(SHOULDER), 0)
+    return np.minimum(linear, np.float32(SHOULDER)) + above * room / (above + room)
 
 
 def _linear(value: float) -> float:
@@ -201,7 +209,8 @@ def _linear(value: float) -> float:
 
 
 @cache
-def _srgb_table() -> NDArray[np.uint8]:
+def srgb_table() -> NDArray[np.uint8]:
+    """Return the sRGB bytes of 4096 linear values 0..1."""
     linear = np.arange(4096) / 4095
     encoded = np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
     return np.rint(encoded * 255).astype(np.uint8)
