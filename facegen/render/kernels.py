@@ -16,7 +16,7 @@ import math
 import numpy as np
 from numba import njit
 
-from facegen.render.shading import BOUNCE, CAVITY, DARKEST, INSIDE_LIGHT, SHOULDER, WINDOW_FULL, WINDOW_GONE
+from facegen.render.shading import BOUNCE, INSIDE_LIGHT, SHOULDER, WINDOW_FULL, WINDOW_GONE
 from facegen.render.soft import DEPTH_STEP
 from facegen.render.zbuffer import PATTERNS
 
