@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from facegen.facs.tables import load_expressions, load_person, load_units
     from facegen.fileio.images import contact_sheet, save_image
     from facegen.geometry.mesh import Mesh
+    from facegen.jobs.batch import run_batch
     from facegen.render import Renderer, render, render_passes
 
 __version__ = "0.1.0"
@@ -57,6 +58,7 @@ __all__ = [
     "render",
     "render_passes",
     "resolve",
+    "run_batch",
     "save_image",
 ]
 
@@ -71,6 +73,7 @@ _HOMES = {
     "facegen.facs.tables": ("load_expressions", "load_person", "load_units"),
     "facegen.fileio.images": ("contact_sheet", "save_image"),
     "facegen.geometry.mesh": ("Mesh",),
+    "facegen.jobs.batch": ("run_batch",),
     "facegen.render.passes": ("render_passes",),
     "facegen.render.render": ("Renderer",),
     "facegen": ("render",),                 # the package itself: calling it draws

@@ -10,7 +10,7 @@ from typing import Annotated
 import typer
 
 from facegen import __version__
-from facegen.cli import explain, figures, gallery, listing, picture
+from facegen.cli import batch, explain, figures, gallery, listing, picture
 from facegen.errors import FacegenError, InputError
 
 DONE, STOPPED, WRONG = 0, 1, 2
@@ -24,6 +24,7 @@ app.command("render")(picture.render)
 app.add_typer(listing.app, name="list")
 app.command("explain")(explain.explain)
 app.command("gallery")(gallery.gallery)
+app.command("batch")(batch.batch)
 app.command("figures")(figures.figures)
 
 
