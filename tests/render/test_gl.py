@@ -14,7 +14,6 @@ from shapes import box, sphere
 
 from facegen import load_face
 from facegen.errors import InputError
-from facegen.geometry.camera import frame
 from facegen.geometry.mesh import merge
 from facegen.render import Renderer, render
 from facegen.render.scene import Light, Scene

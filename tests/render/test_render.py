@@ -224,6 +224,8 @@ def nan_ball():
     (lambda: render(nan_ball()), r"^thing: expected finite vertices, vertex 7 "),
     (lambda: render(Mesh.of(np.zeros((3, 3)), np.zeros((0, 3), int))), r"^thing: .*no triangles"),
     (lambda: render("happiness"), r"^thing: expected a Mesh or a face, got str"),
+    (lambda: render(merge([BALL, sphere(radius=5)]), camera=frame(BALL.vertices * 0.2, size=(64, 64))),
+     r"^camera: the camera stands inside the mesh or too near to it.*move the camera away"),
     (lambda: render(BallRig(), detail=4), r"^detail: expected a subdivision level"),
 ])
 def test_wrong_arguments_are_named_at_the_door(call, message):
