@@ -216,8 +216,8 @@ class Clip:
             raise InputError(f"fps: expected frames a second, {LOWEST_FPS:g}..{HIGHEST_FPS:g}, got {fps!r}")
         count = max(1, round(Fraction(self.duration) * Fraction(fps)))
         if count > MOST_FRAMES:
-            raise InputError(f"fps: {self.duration:g} s at {float(fps):g} frames a second are {count} frames; the limit "
-                             f"is {MOST_FRAMES}: take fewer a second or cut the clip")
+            raise InputError(f"fps: {self.duration:g} s at {float(fps):g} frames a second are {count} frames; the "
+                             f"limit is {MOST_FRAMES}: take fewer a second or cut the clip")
         return count
 
     def times(self, fps: float) -> list[float]:

@@ -117,8 +117,8 @@ class _Reader:
         for track in tracks:
             late = max([key.t for key in track.keyframes] + [event.at for event in track.events])
             if late > duration:
-                raise entry.fail(f"the clip ends at {duration:g} s, but in {track.name} something begins at {late:g} s; "
-                                 "raise duration or leave it out")
+                raise entry.fail(f"the clip ends at {duration:g} s, but in {track.name} something begins at "
+                                 f"{late:g} s: raise duration or leave it out")
         return duration
 
     def _track(self, name: str, fields: Mapping[str, Entry]) -> Track:
@@ -227,7 +227,9 @@ class _Reader:
             return None
         entry = self.fields["idle"]
         parts = ("blink", "gaze", "head")
-        fields = entry.fields(required=("seed",), optional=parts) if isinstance(entry.value, Mapping) else {"seed": entry}
+        fields = {"seed": entry}
+        if isinstance(entry.value, Mapping):
+            fields = entry.fields(required=("seed",), optional=parts)
         seed = fields["seed"].number(0, 2**53)
         if seed != int(seed):
             raise fields["seed"].wrong("a whole number as the seed")
