@@ -66,7 +66,8 @@ class _Blinks:
         self.location, self.scale = math.log(self.numbers["mean"]) - spread / 2, math.sqrt(spread)
         self.starts: list[float] = []
         self.heights: list[float] = []
-        self.free = -self.rng.uniform(0.0, self.numbers["mean"] / 2)       # a clip does not begin just after a blink
+        # A clip does not begin just after a blink.
+        self.free = -float(self.rng.uniform(0.0, self.numbers["mean"] / 2))
 
     def at(self, t: float) -> float:
         """Return how far the lids are closed, 0..1."""
@@ -79,8 +80,8 @@ class _Blinks:
     def _grow(self) -> None:
         """Append one blink, or two."""
         n = self.numbers
-        start = self.free + self.rng.lognormal(self.location, self.scale)
-        complete, height, double, gap = self.rng.random(4)
+        start = self.free + float(self.rng.lognormal(self.location, self.scale))
+        complete, height, double, gap = self.rng.random(4).tolist()
         height = 1.0 if complete < n["complete"] else _within(n["partial"], height)
         self._append(max(start, 0.0), height)
         if double < n["double"]:
@@ -130,7 +131,7 @@ class _Gaze:
     def _grow(self) -> None:
         """Append one saccade and the fixation after it."""
         n = self.numbers
-        across, up, hold, size, angle, look = self.rng.random(6)
+        across, up, hold, size, angle, look = self.rng.random(6).tolist()
         if self.free >= self.away_at:
             distance, angle = _within(n["glance"], size), 2 * math.pi * angle
             target = (distance * math.cos(angle), 0.6 * distance * math.sin(angle))     # eyes move sideways more
@@ -157,9 +158,9 @@ class _Head:
     def __init__(self, seed: int) -> None:
         rng = np.random.default_rng([seed, _HEAD])
         self.numbers = load_timing().head
-        self.waves = [[(2 * math.pi * _within(pace, rng.random()), 2 * math.pi * rng.random(), share)
+        self.waves = [[(2 * math.pi * _within(pace, rng.random()), 2 * math.pi * float(rng.random()), share)
                        for pace, share in zip(self.RATES, self.SHARES, strict=True)] for _ in range(3)]
-        self.breath = 2 * math.pi * rng.random()
+        self.breath = 2 * math.pi * float(rng.random())
 
     def at(self, t: float) -> tuple[float, float, float]:
         """Return yaw, pitch and roll in degrees."""
@@ -173,7 +174,7 @@ _blinks, _gaze, _head = cache(_Blinks), cache(_Gaze), cache(_Head)
 
 
 def _within(pair: tuple[float, float], share: float) -> float:
-    return pair[0] + share * (pair[1] - pair[0])
+    return float(pair[0] + share * (pair[1] - pair[0]))
 
 
 def _bell(share: float) -> float:

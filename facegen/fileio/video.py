@@ -127,9 +127,10 @@ def _checked(frames: Iterable[ArrayLike], shape: tuple[int, ...], clear: bool) -
 
 # -- PyAV -------------------------------------------------------------------------------------------------------
 def _write_video(file: Any, form: Format, frames: Iterable[ArrayLike], fps: Fraction, shape: tuple[int, ...]) -> None:
-    av = _av()
+    av, out = _av(), _Watched(file)
     try:
-        with av.open(file, "w", format=form.kind) as container:
+        # "bitexact": no random numbers and no version in the file, so that the same frames make the same bytes
+        with av.open(out, "w", format=form.kind, options={"fflags": "+bitexact"}) as container:
             stream = container.add_stream(form.codec, rate=fps, options=form.options)
             stream.width, stream.height, stream.pix_fmt = shape[1], shape[0], "yuv420p"
             stream.time_base = stream.codec_context.time_base = 1 / fps
@@ -143,7 +144,28 @@ def _write_video(file: Any, form: Format, frames: Iterable[ArrayLike], fps: Frac
                 container.mux(stream.encode(frame))
             container.mux(stream.encode())
     except av.FFmpegError as error:
-        raise OSError(getattr(error, "errno", None), str(error)) from error
+        raise out.error or OSError(str(error)) from error
+
+
+class _Watched:
+    """A file that remembers why it could not be written: FFmpeg only says that it failed."""
+
+    def __init__(self, file: Any) -> None:
+        self._file, self.error = file, None
+        self.seek, self.tell, self.name = file.seek, file.tell, file.name
+
+    def write(self, data: bytes) -> int:
+        try:
+            return self._file.write(data)
+        except OSError as error:
+            self.error = error
+            raise
+
+    def seekable(self) -> bool:
+        return True
+
+    def writable(self) -> bool:
+        return True
 
 
 # -- Pillow -----------------------------------------------------------------------------------------------------
