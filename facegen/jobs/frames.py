@@ -149,10 +149,11 @@ def save_turn(what: Any, path: str | os.PathLike[str], *, seconds: float = 4.0, 
     yaws = [360.0 * k / count for k in range(count)]
     if turn is not None:
         try:
-            start, end = (check_view((yaw, 0.0))[0] for yaw in turn)
-        except (TypeError, ValueError) as error:
-            raise error if isinstance(error, InputError) else InputError(
-                f"turn: expected two yaws in degrees, (from, to), got {turn!r}") from None
+            start, end = (float(yaw) for yaw in turn)
+        except (TypeError, ValueError):
+            raise InputError(f"turn: expected two yaws in degrees, (from, to), got {turn!r}") from None
+        for yaw in (start, end):
+            check_view((yaw, pitch))
         yaws = [start + (end - start) * min_jerk(1.0 - abs(1.0 - 2.0 * k / count)) for k in range(count)]
     rig, name, mesh, level = _prepared(face, size, (yaws[0], pitch), detail, background, renderer)
     posed = rig.pose(pose, detail=level)

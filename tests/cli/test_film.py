@@ -52,8 +52,8 @@ def test_warnings_and_quiet(run, tmp_path, script):
 
 def test_morph(run, tmp_path):
     out = tmp_path / "morph.webp"
-    code, text, _ = run("morph", "happiness", "12C+4D", "figure-8", "-o", out, "--seconds", "0.2", "--hold", "0.1", "--back",
-                        "--fps", "10", "--json", *QUICK)
+    code, text, _ = run("morph", "happiness", "12C+4D", "figure-8", "-o", out, "--seconds", "0.2", "--hold", "0.1",
+                        "--back", "--fps", "10", "--json", *QUICK)
     assert code == 0
     assert json.loads(text)["frames"] == 9
     with Image.open(out) as film:
@@ -62,12 +62,12 @@ def test_morph(run, tmp_path):
 
 def test_turntable(run, tmp_path):
     out = tmp_path / "turn.webp"
-    code, text, _ = run("turntable", "happiness", "-o", out, "--seconds", "0.5", "--fps", "10", "--range=-30,30", "--json",
-                        *QUICK)
+    code, text, _ = run("turntable", "happiness", "-o", out, "--seconds", "0.5", "--fps", "12", "--range=-30,30",
+                        "--json", *QUICK)
     assert code == 0
-    assert json.loads(text)["frames"] == 5
+    assert json.loads(text)["frames"] == 6
     with Image.open(out) as film:
-        assert film.n_frames == 5
+        assert film.n_frames == 6
 
 
 @pytest.mark.parametrize(("argv", "words"), [

@@ -68,8 +68,6 @@ def test_a_film(tmp_path, suffix):
 def test_the_same_bytes_whatever_the_workers(tmp_path):
     for workers in (1, 2):
         save_clip(CLIP, tmp_path / str(workers), fps=15, workers=workers, **QUICK)
-        save_clip(CLIP, tmp_path / f"{workers}.gif", fps=15, workers=workers, **QUICK)
-    assert (tmp_path / "1.gif").read_bytes() == (tmp_path / "2.gif").read_bytes()
     for one in (tmp_path / "1").glob("*.png"):
         assert one.read_bytes() == (tmp_path / "2" / one.name).read_bytes()
 
@@ -201,8 +199,9 @@ def test_wrong_wishes_are_told_before_work(tmp_path, monkeypatch, change, words)
 
 
 @pytest.mark.parametrize(("change", "words"), [
-    ({"seconds": 0}, "duration"), ({"seconds": 1e9}, "duration"), ({"turn": (0,)}, "turn"), ({"turn": ("a", 2)}, "turn"),
-    ({"turn": (0, 900)}, "yaw"), ({"pitch": 91}, "pitch"), ({"what": "hapiness"}, "did you mean"),
+    ({"seconds": 0}, "duration"), ({"seconds": 1e9}, "duration"), ({"turn": (0,)}, "turn"),
+    ({"turn": ("a", 2)}, "turn"), ({"turn": (0, 900)}, "yaw"), ({"pitch": 91}, "pitch"),
+    ({"what": "hapiness"}, "did you mean"),
 ])
 def test_wrong_turns(tmp_path, change, words):
     with pytest.raises(facegen.InputError, match=words):
