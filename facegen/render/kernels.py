@@ -16,36 +16,51 @@ import math
 import numpy as np
 from numba import njit
 
-from facegen.render.shading import BOUNCE, CAVITY, DARKEST, INSIDE_LIGHT, SHOULDER, WINDOW_FULL, WINDOW_GONE
+from facegen.render.shading import BOUNCE, INSIDE_LIGHT, SHOULDER, WINDOW_FULL, WINDOW_GONE
 from facegen.render.soft import DEPTH_STEP
 from facegen.render.zbuffer import PATTERNS
 
 # Because NaN and infinity must keep their meaning, nnan and ninf are left out.
 _FAST = {"contract", "reassoc", "arcp", "nsz", "afn"}
-_options = {"cache": True, "nogil": True, "fastmath": _FAST, "error_model": "numpy"}
+OPTIONS = {"cache": True, "nogil": True, "fastmath": _FAST, "error_model": "numpy"}
 
 BAND_ROWS = 16
 CHUNK = 256
 DEPTHS = 2.0**31 - 2
-_LANES = 16
-_BLOCK = 2 * _LANES                       # depths, then triangles
+# Indices are unsigned: a signed one may count from the end, and the test for that stops vectorisation.
+_LANES = np.uint64(16)
+_ROW_BLOCK = 32                           # a block in the buffer: 16 depths, then 16 triangles
+_BLOCK = np.uint64(_ROW_BLOCK)
 _STEP = np.int64(DEPTH_STEP * DEPTHS)
-_SAMPLE_X = np.array(PATTERNS[4], np.int64)
-_SAMPLE_Y = np.array([32, 96, 160, 224], np.int64)
+_LANE_X = np.array([256 * (lane >> 2) + PATTERNS[4][lane & 3] for lane in range(16)], np.int32)
+_LANE_Y = np.array([32 + 64 * (lane & 3) for lane in range(16)], np.int32)
+# A point to be shaded is its row in the band, its column, and the mask of the samples it stands for: it lies in
+# their middle, and their number is its share of the pixel.
+_ROW_SHIFT, _ROW_MASK = 16, 2**16 - 1
+_MASKS = [[s for s in range(4) if mask >> s & 1] or [0] for mask in range(16)]
+_SPOT_X = np.array([np.mean([PATTERNS[4][s] / 256 for s in mask]) for mask in _MASKS], np.float32)
+_SPOT_Y = np.array([np.mean([(s + 0.5) / 4 for s in mask]) for mask in _MASKS], np.float32)
+_SHARE = np.array([len(mask) / 4 for mask in _MASKS], np.float32)
 # Beyond this many sub-pixels (96 pixels) an edge function may leave 32 bits.
 _SMALL = 96 * 256
 _FARTHEST = 2.0**14
 # A depth plane steeper than this, in depths a sub-pixel, belongs to a triangle seen edge on.
 _STEEP = 2.0**40
+# ... and one gentler than this cannot leave 32 bits within a block.
+_GENTLE = 2.0**20
 
 # Rows of a chunk's flat work array. The lights' shares come last, as many as there are.
-(_NX, _NY, _NZ, _VX, _VY, _VZ, _NV, _FREE, _R, _G, _B, _SR, _SG, _SB, _X, _Y, _REACH) = range(17)
 WORK_ROWS = 17
+(_NX, _NY, _NZ, _VX, _VY, _VZ, _NV, _FREE, _R, _G, _B, _SR, _SG, _SB, _X, _Y, _REACH) = (
+    np.uint64(CHUNK * row) for row in range(WORK_ROWS))
+_CHUNK = np.uint64(CHUNK)
+(_P0, _P1, _P2, _P3, _P4, _P5, _P6, _P7, _P8, _P9, _P10, _P11, _P12, _P13, _P14, _P15, _P16, _P17) = (
+    np.uint64(k) for k in range(18))
 
 
-@njit(**_options)
+@njit(**OPTIONS)
 def project(vertices, cam, proj, snapped, depth):
-    """Fill proj (n, 3: pixel x, y, depth in units), snapped (n, 2) sub-pixels and depth (n,), -1 before the near plane."""
+    """Fill proj (n, 3): pixel x, y, depth in units; snapped (n, 2) sub-pixels; depth (n,): -1 before the near plane."""
     ortho, near = cam[16] != 0.0, cam[17]
     low, high = np.inf, -np.inf
     for v in range(len(vertices)):
@@ -66,11 +81,15 @@ def project(vertices, cam, proj, snapped, depth):
         depth[v] = (0.01 + 0.98 * (depth[v] - low) / span) * DEPTHS if proj[v, 2] > near else -1.0
 
 
-@njit(**_options)
-def bin_triangles(faces, snapped, depth, width, height, face_materials, inside, kind, first, last, starts):
-    """Fill kind (m,) with materials (``inside`` for back faces) and return the triangles of each band, in order."""
+@njit(**OPTIONS)
+def bin_triangles(faces, snapped, depth, width, height, face_materials, inside, kind, first, last, starts, columns):
+    """Fill kind (m,) with materials (``inside`` for back faces) and return the triangles of each band, in order.
+
+    columns (bands, 2): the first and the last block of four pixels that a band's triangles may touch.
+    """
     bands = len(starts) - 1
     starts[:] = 0
+    columns[:, 0], columns[:, 1] = width >> 2, -1
     for t in range(len(faces)):
         a, b, c = faces[t, 0], faces[t, 1], faces[t, 2]
         first[t], last[t] = 0, -1
@@ -88,6 +107,7 @@ def bin_triangles(faces, snapped, depth, width, height, face_materials, inside, 
         first[t], last[t] = top // BAND_ROWS, bottom // BAND_ROWS
         for band in range(first[t], last[t] + 1):
             starts[band + 1] += 1
+            columns[band, 0], columns[band, 1] = min(columns[band, 0], left >> 2), max(columns[band, 1], right >> 2)
     for band in range(bands):
         starts[band + 1] += starts[band]
     items = np.empty(starts[bands], np.int32)
@@ -99,37 +119,47 @@ def bin_triangles(faces, snapped, depth, width, height, face_materials, inside, 
     return items
 
 
-def _blocks(integer):
-    """Return the loop over a row's blocks for edge functions of one integer type."""
+def _rows(integer, lane_depth):
+    """Return the loop over a triangle's blocks for edge functions of one integer type."""
 
-    @njit(**_options)
-    def blocks(buffer, offsets, depths, at, count, e0, e1, e2, s0, s1, s2, z, step, triangle):
-        for block in range(count):
-            p = at + _BLOCK * block
-            for lane in range(_LANES):
-                inside = (integer(e0 + offsets[lane]) | integer(e1 + offsets[_LANES + lane])
-                          | integer(e2 + offsets[2 * _LANES + lane]))
-                here, old = np.int32(z + depths[lane]), buffer[p + lane]
-                take = (inside >= 0) & (here >= old)
-                buffer[p + lane] = here if take else old
-                buffer[p + _LANES + lane] = triangle if take else buffer[p + _LANES + lane]
-            e0, e1, e2, z = integer(e0 + s0), integer(e1 + s1), integer(e2 + s2), np.int32(z + step)
+    @njit(**OPTIONS)
+    def rows(buffer, at, pitch, height, count, e0, e1, e2, dx0, dx1, dx2, dy0, dy1, dy2, z, zx, zy, triangle):
+        a0, a1, a2, b0, b1, b2 = integer(dx0), integer(dx1), integer(dx2), integer(dy0), integer(dy1), integer(dy2)
+        s0, s1, s2 = integer(-1024 * dy0), integer(-1024 * dy1), integer(-1024 * dy2)
+        step = _wrapped(1024.0 * zx)
+        for row in range(height):
+            p, near = at, _wrapped(z + 256.0 * row * zy)
+            f0, f1, f2 = integer(e0 + row * 256 * dx0), integer(e1 + row * 256 * dx1), integer(e2 + row * 256 * dx2)
+            for _ in range(count):
+                for lane in range(_LANES):
+                    # What does not change from block to block is taken out of the loop by the compiler.
+                    x, y = _LANE_X[lane], _LANE_Y[lane]
+                    inside = (integer(f0 + integer(integer(a0 * y) - integer(b0 * x)))
+                              | integer(f1 + integer(integer(a1 * y) - integer(b1 * x)))
+                              | integer(f2 + integer(integer(a2 * y) - integer(b2 * x))))
+                    here, old = np.int32(near + lane_depth(zx * x + zy * y)), buffer[p + lane]
+                    take = (inside >= 0) & (here >= old)
+                    buffer[p + lane] = here if take else old
+                    buffer[p + _LANES + lane] = triangle if take else buffer[p + _LANES + lane]
+                f0, f1, f2, near = integer(f0 + s0), integer(f1 + s1), integer(f2 + s2), np.int32(near + step)
+                p += _BLOCK
+            at += pitch
 
-    return blocks
+    return rows
 
 
-_narrow, _wide = _blocks(np.int32), _blocks(np.int64)
-
-
-@njit(**_options)
+@njit(**OPTIONS)
 def _wrapped(value):
     """Return a depth's lower 32 bits: sums of such parts are right wherever the whole is in range."""
     return np.int32(np.int64(value))
 
 
-@njit(**_options)
-def _scan(buffer, offsets, offsets64, depths, faces, snapped, depth, triangle, top, bottom, width, columns):
-    """Draw a triangle into the band's rows top..bottom; ``columns`` (2,) grows to the blocks touched.
+_narrow, _wide = _rows(np.int32, np.int32), _rows(np.int64, _wrapped)
+
+
+@njit(**OPTIONS)
+def _scan(buffer, faces, snapped, depth, triangle, top, bottom, width):
+    """Draw a triangle into the band's rows top..bottom.
 
     Corners are whole sub-pixels, so the edge functions are exact: with the top-left rule a sample on a shared edge
     belongs to one of its triangles.
@@ -147,203 +177,224 @@ def _scan(buffer, offsets, offsets64, depths, faces, snapped, depth, triangle, t
     left, right = max((low + 31) >> 8, 0) >> 2, min((high - 32) >> 8, width - 1) >> 2
     if first > last or left > right:
         return
-    columns[0], columns[1] = min(columns[0], left), max(columns[1], right)
-
-    zx = ((zb - za) * (yc - ya) - (zc - za) * (yb - ya)) / area
-    zy = ((zc - za) * (xb - xa) - (zb - za) * (xc - xa)) / area
+    dx0, dy0, dx1, dy1, dx2, dy2 = xb - xa, yb - ya, xc - xb, yc - yb, xa - xc, ya - yc
+    scale = 1.0 / area
+    zx, zy = ((zc - za) * dy0 + (zb - za) * dy2) * -scale, ((zc - za) * dx0 + (zb - za) * dx2) * scale
     if abs(zx) > _STEEP or abs(zy) > _STEEP:
         zx = zy = 0.0
-    small = high - low <= _SMALL and down - up <= _SMALL
-    dx0, dy0, dx1, dy1, dx2, dy2 = xb - xa, yb - ya, xc - xb, yc - yb, xa - xc, ya - yc
     # A sample exactly on an edge is inside only if the edge is a left or a top one.
     bias0 = 0 if dy0 < 0 or (dy0 == 0 and dx0 > 0) else -1
     bias1 = 0 if dy1 < 0 or (dy1 == 0 and dx1 > 0) else -1
     bias2 = 0 if dy2 < 0 or (dy2 == 0 and dx2 > 0) else -1
-    for lane in range(_LANES):
-        x, y = 256 * (lane >> 2) + _SAMPLE_X[lane & 3], _SAMPLE_Y[lane & 3]
-        depths[lane] = _wrapped(zx * x + zy * y)
-        o0, o1, o2 = dx0 * y - dy0 * x + bias0, dx1 * y - dy1 * x + bias1, dx2 * y - dy2 * x + bias2
-        if small:
-            offsets[lane], offsets[_LANES + lane], offsets[2 * _LANES + lane] = np.int32(o0), np.int32(o1), np.int32(o2)
-        else:
-            offsets64[lane], offsets64[_LANES + lane], offsets64[2 * _LANES + lane] = o0, o1, o2
-    x, row_blocks = 1024 * left, (width + 3) >> 2
-    for row in range(first, last + 1):
-        y = 256 * row
-        e0 = dx0 * (y - ya) - dy0 * (x - xa)
-        e1 = dx1 * (y - yb) - dy1 * (x - xb)
-        e2 = dx2 * (y - yc) - dy2 * (x - xc)
-        z, step = _wrapped(za + zx * (x - xa) + zy * (y - ya)), _wrapped(1024.0 * zx)
-        at = ((row - top) * row_blocks + left) * _BLOCK
-        if small:
-            _narrow(buffer, offsets, depths, at, right - left + 1, np.int32(e0), np.int32(e1), np.int32(e2),
-                    np.int32(-1024 * dy0), np.int32(-1024 * dy1), np.int32(-1024 * dy2), z, step, np.int32(triangle))
-        else:
-            _wide(buffer, offsets64, depths, at, right - left + 1, e0, e1, e2,
-                  -1024 * dy0, -1024 * dy1, -1024 * dy2, z, step, np.int32(triangle))
+    x, y = 1024 * left, 256 * first
+    e0 = dx0 * (y - ya) - dy0 * (x - xa) + bias0
+    e1 = dx1 * (y - yb) - dy1 * (x - xb) + bias1
+    e2 = dx2 * (y - yc) - dy2 * (x - xc) + bias2
+    z = za + zx * (x - xa) + zy * (y - ya)
+    pitch = np.uint64(((width + 3) >> 2) * _ROW_BLOCK)
+    at = np.uint64((first - top) * ((width + 3) >> 2) + left) * _BLOCK
+    if high - low <= _SMALL and down - up <= _SMALL and abs(zx) + abs(zy) < _GENTLE:
+        _narrow(buffer, at, pitch, last - first + 1, right - left + 1, e0, e1, e2,
+                dx0, dx1, dx2, dy0, dy1, dy2, z, zx, zy, np.int32(triangle))
+    else:
+        _wide(buffer, at, pitch, last - first + 1, right - left + 1, e0, e1, e2,
+              dx0, dx1, dx2, dy0, dy1, dy2, z, zx, zy, np.int32(triangle))
 
 
-@njit(**_options)
+@njit(**OPTIONS)
 def _angle(sine, cosine):
-    """Return atan2 for a sine of 0 or more, within 2e-6: what weighs a triangle needs no more.
+    """Return atan2 for a sine of 0 or more, within 1e-5: what weighs a triangle needs no more.
 
     Based on: the odd minimax polynomial of the arc tangent on 0..1, as in Hastings, "Approximations for digital
     computers", 1955.
     """
     size = abs(cosine)
-    ratio = min(sine, size) / max(max(sine, size), 1e-300)
+    ratio = min(sine, size) / max(max(sine, size), np.float32(1e-30))
     s = ratio * ratio
-    angle = ratio * (0.99997726 + s * (-0.33262347 + s * (0.19354346 + s * (
-        -0.11643287 + s * (0.05265332 + s * -0.01172120)))))
+    angle = ratio * (np.float32(0.99997726) + s * (np.float32(-0.33262347) + s * (np.float32(0.19354346) + s * (
+        np.float32(-0.11643287) + s * (np.float32(0.05265332) + s * np.float32(-0.01172120))))))
     if sine > size:
-        angle = 0.5 * math.pi - angle
-    return math.pi - angle if cosine < 0.0 else angle
+        angle = np.float32(0.5 * math.pi) - angle
+    return np.float32(math.pi) - angle if cosine < 0 else angle
 
 
-@njit(**_options)
-def _normal(vertices, starts, ring, v, out):
-    """Write the unit normal of a vertex, world axes: its triangles' normals, each by its angle there."""
-    x, y, z = vertices[v, 0], vertices[v, 1], vertices[v, 2]
-    nx = ny = nz = 0.0
-    for k in range(starts[v], starts[v + 1]):
-        p, q = ring[k, 0], ring[k, 1]
-        ax, ay, az = vertices[p, 0] - x, vertices[p, 1] - y, vertices[p, 2] - z
-        bx, by, bz = vertices[q, 0] - x, vertices[q, 1] - y, vertices[q, 2] - z
-        cx, cy, cz = ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
-        size = math.sqrt(cx * cx + cy * cy + cz * cz)
-        if size > 0.0:
-            weight = _angle(size, ax * bx + ay * by + az * bz) / size
-            nx, ny, nz = nx + weight * cx, ny + weight * cy, nz + weight * cz
-    size = math.sqrt(nx * nx + ny * ny + nz * nz)
-    scale = 1.0 / size if size > 0.0 else 0.0
-    out[0], out[1], out[2] = nx * scale, ny * scale, nz * scale
+@njit(**OPTIONS)
+def all_normals(vertices, faces, work, normals):
+    """Fill normals (n, 3) float32, world axes: the triangles' normals, each by its angle at the vertex.
+
+    work (6 * CHUNK,): two edges of each triangle of a chunk, which become its unit normal and its angles.
+    """
+    normals[:] = 0
+    m = np.uint64(len(faces))
+    for first in range(np.uint64(0), m, _CHUNK):
+        count = min(m - first, _CHUNK)
+        for i in range(count):
+            a, b, c = (np.uint64(faces[first + i, _P0]), np.uint64(faces[first + i, _P1]),
+                       np.uint64(faces[first + i, _P2]))
+            for k in range(_P3):
+                work[k * _CHUNK + i] = vertices[b, k] - vertices[a, k]
+                work[(_P3 + k) * _CHUNK + i] = vertices[c, k] - vertices[a, k]
+        for i in range(count):
+            ux, uy, uz = work[i], work[_CHUNK + i], work[_P2 * _CHUNK + i]
+            vx, vy, vz = work[_P3 * _CHUNK + i], work[_P4 * _CHUNK + i], work[_P5 * _CHUNK + i]
+            nx, ny, nz = uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
+            size = np.float32(math.sqrt(nx * nx + ny * ny + nz * nz))
+            uv = ux * vx + uy * vy + uz * vz
+            at_a = _angle(size, uv)
+            at_b = _angle(size, ux * ux + uy * uy + uz * uz - uv)
+            scale = np.float32(1) / max(size, np.float32(1e-30))
+            work[i], work[_CHUNK + i], work[_P2 * _CHUNK + i] = nx * scale, ny * scale, nz * scale
+            work[_P3 * _CHUNK + i], work[_P4 * _CHUNK + i] = at_a, at_b
+            work[_P5 * _CHUNK + i] = np.float32(math.pi) - at_a - at_b
+        for i in range(count):
+            for corner in range(_P3):
+                v = np.uint64(faces[first + i, corner])
+                weight = work[(_P3 + corner) * _CHUNK + i]
+                normals[v, _P0] += weight * work[i]
+                normals[v, _P1] += weight * work[_CHUNK + i]
+                normals[v, _P2] += weight * work[_P2 * _CHUNK + i]
+    for v in range(np.uint64(len(normals))):
+        nx, ny, nz = normals[v, _P0], normals[v, _P1], normals[v, _P2]
+        scale = np.float32(1) / max(np.float32(math.sqrt(nx * nx + ny * ny + nz * nz)), np.float32(1e-30))
+        normals[v, _P0], normals[v, _P1], normals[v, _P2] = nx * scale, ny * scale, nz * scale
 
 
-@njit(**_options)
-def all_normals(vertices, starts, ring, normals):
-    """Fill normals (n, 3) of all vertices, world axes."""
-    for v in range(len(vertices)):
-        _normal(vertices, starts, ring, v, normals[v])
+@njit(**OPTIONS)
+def fill_attributes(normals, light, cam, attributes):
+    """Fill attributes (n, 4 + lights): the normal in camera axes, then the shares of light."""
+    shares = light.shape[1]
+    for v in range(np.uint64(len(attributes))):
+        attributes[v, _P0], attributes[v, _P1], attributes[v, _P2] = _turned(
+            cam, normals[v, _P0], normals[v, _P1], normals[v, _P2])
+        for k in range(np.uint64(shares)):
+            attributes[v, _P3 + k] = light[v, k]
 
 
-@njit(**_options)
-def _prepare(t, vertices, faces, proj, cam, flat, starts, ring, known, attributes, vertex_ready, planes, ready, scratch):
-    """Work out what shading asks of a triangle: corner weights as functions of the pixel, and normals.
+@njit(**OPTIONS)
+def _prepare(t, vertices, faces, proj, cam, flat, planes, ready):
+    """Work out what shading asks of a triangle that owns a pixel: its corners' weights as functions of the pixel.
 
-    The functions are those of `shading._corner_weights`. planes (m, 14): nine coefficients, the origin's x and y,
+    The functions are those of `shading._corner_weights`. planes (m, 16): nine coefficients, the origin's x and y,
     and for flat shading the normal.
     """
-    a, b, c = faces[t, 0], faces[t, 1], faces[t, 2]
-    ox, oy = proj[a, 0], proj[a, 1]
-    ortho, near = cam[16] != 0.0, cam[17]
-    wa = 1.0 if ortho else max(proj[a, 2], near)
-    wb = 1.0 if ortho else max(proj[b, 2], near)
-    wc = 1.0 if ortho else max(proj[c, 2], near)
-    xb, yb, xc, yc = (proj[b, 0] - ox) * wb, (proj[b, 1] - oy) * wb, (proj[c, 0] - ox) * wc, (proj[c, 1] - oy) * wc
+    t = np.uint64(t)
+    a, b, c = np.uint64(faces[t, _P0]), np.uint64(faces[t, _P1]), np.uint64(faces[t, _P2])
+    ox, oy = proj[a, _P0], proj[a, _P1]
+    ortho, near = cam[_P16] != 0.0, cam[_P17]
+    wa = 1.0 if ortho else max(proj[a, _P2], near)
+    wb = 1.0 if ortho else max(proj[b, _P2], near)
+    wc = 1.0 if ortho else max(proj[c, _P2], near)
+    xb, yb = (proj[b, _P0] - ox) * wb, (proj[b, _P1] - oy) * wb
+    xc, yc = (proj[c, _P0] - ox) * wc, (proj[c, _P1] - oy) * wc
     whole = wa * (xb * yc - yb * xc)
     scale = 1.0 / whole if whole != 0.0 else 1.0
-    p = planes[t]
-    p[0], p[1], p[2] = (yb * wc - wb * yc) * scale, (wb * xc - xb * wc) * scale, (xb * yc - yb * xc) * scale
-    p[3], p[4], p[5] = yc * wa * scale, -xc * wa * scale, 0.0
-    p[6], p[7], p[8] = -wa * yb * scale, wa * xb * scale, 0.0
-    p[9], p[10] = ox, oy
+    planes[t, _P0] = (yb * wc - wb * yc) * scale
+    planes[t, _P1] = (wb * xc - xb * wc) * scale
+    planes[t, _P2] = (xb * yc - yb * xc) * scale
+    planes[t, _P3], planes[t, _P4] = yc * wa * scale, -xc * wa * scale
+    planes[t, _P6], planes[t, _P7] = -wa * yb * scale, wa * xb * scale
+    planes[t, _P9], planes[t, _P10] = ox, oy
     if flat:
-        ux, uy, uz = vertices[b, 0] - vertices[a, 0], vertices[b, 1] - vertices[a, 1], vertices[b, 2] - vertices[a, 2]
-        vx, vy, vz = vertices[c, 0] - vertices[a, 0], vertices[c, 1] - vertices[a, 1], vertices[c, 2] - vertices[a, 2]
-        scratch[0], scratch[1], scratch[2] = uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
-        for k in range(3):
-            p[11 + k] = cam[3 * k] * scratch[0] + cam[3 * k + 1] * scratch[1] + cam[3 * k + 2] * scratch[2]
-    elif not known:
-        for corner in range(3):
-            v = faces[t, corner]
-            if not vertex_ready[v]:
-                _normal(vertices, starts, ring, v, scratch)
-                for k in range(3):
-                    attributes[v, k] = (cam[3 * k] * scratch[0] + cam[3 * k + 1] * scratch[1]
-                                        + cam[3 * k + 2] * scratch[2])
-                vertex_ready[v] = 1
+        ux, uy, uz = (vertices[b, _P0] - vertices[a, _P0], vertices[b, _P1] - vertices[a, _P1],
+                      vertices[b, _P2] - vertices[a, _P2])
+        vx, vy, vz = (vertices[c, _P0] - vertices[a, _P0], vertices[c, _P1] - vertices[a, _P1],
+                      vertices[c, _P2] - vertices[a, _P2])
+        planes[t, _P11], planes[t, _P12], planes[t, _P13] = _turned(
+            cam, uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx)
     ready[t] = 1
 
 
-@njit(**_options)
-def _gather(count, kind, entry, spot, work, faces, attributes, planes, material, flat, back, powers):
+@njit(**OPTIONS)
+def _turned(cam, x, y, z):
+    """Return a vector in camera axes."""
+    return (cam[_P0] * x + cam[_P1] * y + cam[_P2] * z, cam[_P3] * x + cam[_P4] * y + cam[_P5] * z,
+            cam[_P6] * x + cam[_P7] * y + cam[_P8] * z)
+
+
+@njit(**OPTIONS)
+def _gather(count, kind, entry, target, top, work, faces, attributes, planes, material, flat, back, powers):
     """Interpolate normal and light shares of a chunk's points into the work array."""
-    columns = attributes.shape[1]
-    lift = material[kind, 9]
-    blend = np.empty(columns, np.float32)
-    for i in range(count):
-        t = entry[i]
-        x, y = spot[2 * i], spot[2 * i + 1]
-        p = planes[t]
-        dx, dy = x - p[9], y - p[10]
-        u = max(p[0] * dx + p[1] * dy + p[2], np.float32(0))
-        v = max(p[3] * dx + p[4] * dy + p[5], np.float32(0))
-        w = max(p[6] * dx + p[7] * dy + p[8], np.float32(0))
+    shares = np.uint64(attributes.shape[1] - 4)
+    power, lifted = np.float32(1) - material[kind, 9], material[kind, 9] != 0.0
+    sign = np.float32(-1) if back else np.float32(1)
+    for i in range(np.uint64(count)):
+        t = np.uint64(entry[i])
+        place = target[i]
+        x = np.float32((place & _ROW_MASK) >> 4) + _SPOT_X[np.uint64(place & 15)]
+        y = np.float32((place >> _ROW_SHIFT) + top) + _SPOT_Y[np.uint64(place & 15)]
+        dx, dy = x - planes[t, _P9], y - planes[t, _P10]
+        u = max(planes[t, _P0] * dx + planes[t, _P1] * dy + planes[t, _P2], np.float32(0))
+        v = max(planes[t, _P3] * dx + planes[t, _P4] * dy, np.float32(0))
+        w = max(planes[t, _P6] * dx + planes[t, _P7] * dy, np.float32(0))
         scale = np.float32(1) / max(u + v + w, np.float32(1e-20))
         u, v, w = u * scale, v * scale, w * scale
-        a, b, c = attributes[faces[t, 0]], attributes[faces[t, 1]], attributes[faces[t, 2]]
-        for k in range(columns):
-            blend[k] = u * a[k] + v * b[k] + w * c[k]
+        a, b, c = np.uint64(faces[t, _P0]), np.uint64(faces[t, _P1]), np.uint64(faces[t, _P2])
         if flat:
-            for k in range(3):
-                blend[k] = p[11 + k]
-        sign = np.float32(-1) if back else np.float32(1)
-        work[_NX * CHUNK + i], work[_NY * CHUNK + i], work[_NZ * CHUNK + i] = sign * blend[0], sign * blend[1], sign * blend[2]
-        work[_X * CHUNK + i], work[_Y * CHUNK + i] = x, y
+            work[_NX + i], work[_NY + i], work[_NZ + i] = (
+                sign * planes[t, _P11], sign * planes[t, _P12], sign * planes[t, _P13])
+        else:
+            work[_NX + i] = sign * (u * attributes[a, _P0] + v * attributes[b, _P0] + w * attributes[c, _P0])
+            work[_NY + i] = sign * (u * attributes[a, _P1] + v * attributes[b, _P1] + w * attributes[c, _P1])
+            work[_NZ + i] = sign * (u * attributes[a, _P2] + v * attributes[b, _P2] + w * attributes[c, _P2])
+        work[_X + i], work[_Y + i] = x, y
+        openness = u * attributes[a, _P3] + v * attributes[b, _P3] + w * attributes[c, _P3]
+        for k in range(shares):
+            at = _P4 + k
+            work[_REACH + k * _CHUNK + i] = (
+                u * attributes[a, at] + v * attributes[b, at] + w * attributes[c, at])
+        if lifted:
+            openness = max(openness, np.float32(0)) ** power
+            for k in range(shares):
+                work[_REACH + k * _CHUNK + i] = max(work[_REACH + k * _CHUNK + i], np.float32(0)) ** power
         if back:
-            work[_FREE * CHUNK + i] = np.float32(INSIDE_LIGHT)
-            for k in range(4, columns):
-                work[(_REACH + k - 4) * CHUNK + i] = np.float32(0)
-            continue
-        if lift != 0.0:
-            for k in range(3, columns):
-                blend[k] = max(blend[k], np.float32(0)) ** (np.float32(1) - lift)
-        at = min(max(blend[3], np.float32(0)), np.float32(1)) * np.float32(len(powers) - 2)
-        cell = np.int32(at)
-        share = at - np.float32(cell)
-        work[_FREE * CHUNK + i] = powers[cell] + share * (powers[cell + 1] - powers[cell])
-        for k in range(4, columns):
-            work[(_REACH + k - 4) * CHUNK + i] = blend[k]
+            work[_FREE + i] = np.float32(INSIDE_LIGHT)
+            for k in range(shares):
+                work[_REACH + k * _CHUNK + i] = np.float32(0)
+        else:
+            at = min(max(openness, np.float32(0)), np.float32(1)) * np.float32(len(powers) - 2)
+            cell = _cell(at, len(powers) - 1)
+            work[_FREE + i] = powers[cell] + (at - np.float32(np.int32(cell))) * (powers[cell + _P1] - powers[cell])
 
 
-@njit(**_options)
+@njit(**OPTIONS)
 def _light(count, look, lamps, sky, view, work):
     """Turn a chunk's normals and shares into colours, rows _R, _G, _B: see `shading.shade`."""
+    count = np.uint64(count)
     one, zero, half = np.float32(1), np.float32(0), np.float32(0.5)
     ortho = view[3] != 0.0
     for i in range(count):
-        nx, ny, nz = work[_NX * CHUNK + i], work[_NY * CHUNK + i], work[_NZ * CHUNK + i]
+        nx, ny, nz = work[_NX + i], work[_NY + i], work[_NZ + i]
         scale = one / max(np.float32(math.sqrt(nx * nx + ny * ny + nz * nz)), np.float32(1e-12))
         nx, ny, nz = nx * scale, ny * scale, nz * scale
-        right, down = (work[_X * CHUNK + i] - view[0]) * view[2], (work[_Y * CHUNK + i] - view[1]) * view[2]
+        right, down = (work[_X + i] - view[0]) * view[2], (work[_Y + i] - view[1]) * view[2]
         length = one / np.float32(math.sqrt(right * right + down * down + one))
         vx, vy, vz = -right * length, down * length, length
         if ortho:
             vx, vy, vz = zero, zero, one
-        work[_NX * CHUNK + i], work[_NY * CHUNK + i], work[_NZ * CHUNK + i] = nx, ny, nz
-        work[_VX * CHUNK + i], work[_VY * CHUNK + i], work[_VZ * CHUNK + i] = vx, vy, vz
-        work[_NV * CHUNK + i] = nx * vx + ny * vy + nz * vz
-        up, free = half + half * ny, work[_FREE * CHUNK + i]
+        work[_NX + i], work[_NY + i], work[_NZ + i] = nx, ny, nz
+        work[_VX + i], work[_VY + i], work[_VZ + i] = vx, vy, vz
+        work[_NV + i] = nx * vx + ny * vy + nz * vz
+        up, free = half + half * ny, work[_FREE + i]
         lost = np.float32(BOUNCE) * (one - free)
-        work[_R * CHUNK + i] = (sky[0] + sky[3] * up) * free / (one - look[0] * lost)
-        work[_G * CHUNK + i] = (sky[1] + sky[4] * up) * free / (one - look[1] * lost)
-        work[_B * CHUNK + i] = (sky[2] + sky[5] * up) * free / (one - look[2] * lost)
-        work[_SR * CHUNK + i] = zero
-        work[_SG * CHUNK + i] = zero
-        work[_SB * CHUNK + i] = zero
+        work[_R + i] = (sky[0] + sky[3] * up) * free / (one - look[0] * lost)
+        work[_G + i] = (sky[1] + sky[4] * up) * free / (one - look[1] * lost)
+        work[_B + i] = (sky[2] + sky[5] * up) * free / (one - look[2] * lost)
+        work[_SR + i] = zero
+        work[_SG + i] = zero
+        work[_SB + i] = zero
     wr, wg, wb = one / (one + look[3]), one / (one + look[4]), one / (one + look[5])
     sharpness = look[7] * np.float32(1 / 1024)
     for k in range(len(lamps)):
         tx, ty, tz, lr, lg, lb = lamps[k, 0], lamps[k, 1], lamps[k, 2], lamps[k, 3], lamps[k, 4], lamps[k, 5]
         shine = look[6] * lamps[k, 6]
-        row = (_REACH + k) * CHUNK
+        row = _REACH + np.uint64(k) * _CHUNK
         for i in range(count):
-            facing = tx * work[_NX * CHUNK + i] + ty * work[_NY * CHUNK + i] + tz * work[_NZ * CHUNK + i]
-            across = tx * work[_VX * CHUNK + i] + ty * work[_VY * CHUNK + i] + tz * work[_VZ * CHUNK + i]
+            facing = tx * work[_NX + i] + ty * work[_NY + i] + tz * work[_NZ + i]
+            across = tx * work[_VX + i] + ty * work[_VY + i] + tz * work[_VZ + i]
             reach = work[row + i]
             # |light + viewer|^2 = 2 + 2 light . viewer; exp(-x) as (1 - x / 1024)^1024.
             size = np.float32(math.sqrt(max(np.float32(2) + np.float32(2) * across, np.float32(1e-12))))
-            lobe = max(one - sharpness * (one - (facing + work[_NV * CHUNK + i]) / size), zero)
+            lobe = max(one - sharpness * (one - (facing + work[_NV + i]) / size), zero)
             lobe = lobe * lobe
             lobe = lobe * lobe
             lobe = lobe * lobe
@@ -355,146 +406,144 @@ def _light(count, look, lamps, sky, view, work):
             lobe = lobe * lobe
             lobe = lobe * lobe
             lobe = lobe * min(max(facing * np.float32(4), zero), one) * reach * shine
-            work[_R * CHUNK + i] += lr * reach * max((facing + look[3]) * wr, zero)
-            work[_G * CHUNK + i] += lg * reach * max((facing + look[4]) * wg, zero)
-            work[_B * CHUNK + i] += lb * reach * max((facing + look[5]) * wb, zero)
-            work[_SR * CHUNK + i] += lr * lobe
-            work[_SG * CHUNK + i] += lg * lobe
-            work[_SB * CHUNK + i] += lb * lobe
+            work[_R + i] += lr * reach * max((facing + look[3]) * wr, zero)
+            work[_G + i] += lg * reach * max((facing + look[4]) * wg, zero)
+            work[_B + i] += lb * reach * max((facing + look[5]) * wb, zero)
+            work[_SR + i] += lr * lobe
+            work[_SG + i] += lg * lobe
+            work[_SB + i] += lb * lobe
     if look[8] != 0.0:
         tx, ty, tz = sky[6], sky[7], sky[8]
         for i in range(count):
-            facing = tx * work[_NX * CHUNK + i] + ty * work[_NY * CHUNK + i] + tz * work[_NZ * CHUNK + i]
-            across = tx * work[_VX * CHUNK + i] + ty * work[_VY * CHUNK + i] + tz * work[_VZ * CHUNK + i]
+            facing = tx * work[_NX + i] + ty * work[_NY + i] + tz * work[_NZ + i]
+            across = tx * work[_VX + i] + ty * work[_VY + i] + tz * work[_VZ + i]
             size = np.float32(math.sqrt(max(np.float32(2) + np.float32(2) * across, np.float32(1e-12))))
-            share = ((facing + work[_NV * CHUNK + i]) / size - np.float32(WINDOW_GONE)) * np.float32(
+            share = ((facing + work[_NV + i]) / size - np.float32(WINDOW_GONE)) * np.float32(
                 1 / (WINDOW_FULL - WINDOW_GONE))
             bright = look[8] * min(max(share, zero), one)
-            work[_SR * CHUNK + i] += bright
-            work[_SG * CHUNK + i] += bright
-            work[_SB * CHUNK + i] += bright
+            work[_SR + i] += bright
+            work[_SG + i] += bright
+            work[_SB + i] += bright
     shoulder, room = np.float32(SHOULDER), np.float32(1 - SHOULDER)
     for c in range(3):
-        row, shine_row, albedo = (_R + c) * CHUNK, (_SR + c) * CHUNK, look[c]
+        row, shine_row, albedo = _R + np.uint64(c) * _CHUNK, _SR + np.uint64(c) * _CHUNK, look[c]
         for i in range(count):
             value = work[row + i] * albedo + work[shine_row + i]
             above = max(value - shoulder, zero)
             work[row + i] = min(value, shoulder) + above * room / (above + room)
 
 
-@njit(**_options)
-def draw_bands(start, stop, step, items, starts, vertices, faces, proj, snapped, depth, kind, inside, cam, flat, known,
-               adjacency, ring, attributes, vertex_ready, planes, ready, material, lamps, sky, view, powers,
-               encode, behind, behind_bytes, transparent, picture):
-    """Draw the bands start, start + step, ... before stop into picture (h, w, 4)."""
-    height, width = picture.shape[0], picture.shape[1]
+@njit(**OPTIONS)
+def draw_bands(start, stop, step, items, starts, columns, vertices, faces, proj, snapped, depth, kind, inside, cam,
+               flat, attributes, planes, ready, material, lamps, sky, view, powers, encode, behind, transparent,
+               picture):
+    """Draw the bands start, start + step, ... before stop over picture (h, w) uint32, which holds the background."""
+    height, width = picture.shape
     row_blocks = (width + 3) >> 2
-    buffer = np.empty(BAND_ROWS * row_blocks * _BLOCK, np.int32)
+    buffer = np.empty(BAND_ROWS * row_blocks * _ROW_BLOCK, np.int32)
     colour = np.empty(BAND_ROWS * row_blocks * 16, np.float32)             # r, g, b, cover of each pixel
-    offsets, offsets64 = np.empty(3 * _LANES, np.int32), np.empty(3 * _LANES, np.int64)
-    depths, columns = np.empty(_LANES, np.int32), np.empty(2, np.int64)
     kinds = len(material)
     entry, target = np.empty((kinds, CHUNK), np.int32), np.empty((kinds, CHUNK), np.int32)
-    spot, weight = np.empty((kinds, 2 * CHUNK), np.float32), np.empty((kinds, CHUNK), np.float32)
     filled = np.zeros(kinds, np.int64)
     work = np.empty((WORK_ROWS + len(lamps)) * CHUNK, np.float32)
-    scratch = np.empty(3, np.float64)
     for band in range(start, stop, step):
-        top, bottom = band * BAND_ROWS, min((band + 1) * BAND_ROWS, height)
-        for row in range(top, bottom):
-            for x in range(width):
-                for c in range(4):
-                    picture[row, x, c] = behind_bytes[row, c]
         if starts[band] == starts[band + 1]:
             continue
-        for block in range((bottom - top) * row_blocks):
-            for lane in range(_LANES):
-                buffer[_BLOCK * block + lane] = 0
-                buffer[_BLOCK * block + _LANES + lane] = -1
-        columns[0], columns[1] = row_blocks, -1
+        top, bottom = band * BAND_ROWS, min((band + 1) * BAND_ROWS, height)
+        left, right = columns[band, 0], columns[band, 1] + 1
+        for row in range(0, row_blocks * (bottom - top), row_blocks):
+            buffer[_ROW_BLOCK * (row + left):_ROW_BLOCK * (row + right)] = 0
+            colour[16 * (row + left):16 * (row + right)] = 0
         for k in range(starts[band], starts[band + 1]):
-            _scan(buffer, offsets, offsets64, depths, faces, snapped, depth, items[k], top, bottom, width, columns)
-        left, right = 4 * columns[0], min(4 * columns[1] + 4, width)
-        for row in range(bottom - top):
-            for k in range(16 * row_blocks * row + 4 * left, 16 * row_blocks * row + 4 * right):
-                colour[k] = 0.0
-
+            _scan(buffer, faces, snapped, depth, items[k], top, bottom, width)
+        left, right = 4 * left, min(4 * right, width)
         for row in range(bottom - top):
             for x in range(left, right):
-                p = (row * row_blocks + (x >> 2)) * _BLOCK + 4 * (x & 3)
-                t0, t1, t2, t3 = buffer[p + 16], buffer[p + 17], buffer[p + 18], buffer[p + 19]
-                if t0 < 0 and t1 < 0 and t2 < 0 and t3 < 0:
+                p = np.uint64((row * row_blocks + (x >> 2)) * _ROW_BLOCK + 4 * (x & 3))
+                if (buffer[p] | buffer[p + _P1] | buffer[p + _P2] | buffer[p + _P3]) == 0:
                     continue
-                pixel = row * 4 * row_blocks + x
-                if t0 >= 0 and t1 >= 0 and t2 >= 0 and t3 >= 0:
-                    k0 = kind[t1]
-                    if kind[t0] == k0 and kind[t2] == k0 and kind[t3] == k0:
-                        d0, d1, d2, d3 = buffer[p], buffer[p + 1], buffer[p + 2], buffer[p + 3]
-                        if max(d0, d1, d2, d3) - min(d0, d1, d2, d3) < _STEP:
-                            n = filled[k0]
-                            entry[k0, n], target[k0, n], weight[k0, n] = t1, pixel, 1.0
-                            spot[k0, 2 * n], spot[k0, 2 * n + 1] = x + 0.5, top + row + 0.5
-                            filled[k0] = n + 1
-                            if not ready[t1]:
-                                _prepare(t1, vertices, faces, proj, cam, flat, adjacency, ring, known, attributes,
-                                         vertex_ready, planes, ready, scratch)
-                            if n + 1 == CHUNK:
-                                _flush(k0, filled, entry, target, spot, weight, work, faces, attributes, planes,
-                                       material, flat, inside, powers, lamps, sky, view, colour)
-                            continue
-                for s in range(4):
-                    t = buffer[p + 16 + s]
-                    if t < 0:
+                left_over = 15
+                for sample in range(4):
+                    if not left_over >> sample & 1:
                         continue
-                    k0 = kind[t]
-                    n = filled[k0]
-                    entry[k0, n], target[k0, n], weight[k0, n] = t, pixel, 0.25
-                    spot[k0, 2 * n] = x + np.float32(_SAMPLE_X[s]) / np.float32(256)
-                    spot[k0, 2 * n + 1] = top + row + np.float32(_SAMPLE_Y[s]) / np.float32(256)
-                    filled[k0] = n + 1
-                    if not ready[t]:
-                        _prepare(t, vertices, faces, proj, cam, flat, adjacency, ring, known, attributes,
-                                 vertex_ready, planes, ready, scratch)
-                    if n + 1 == CHUNK:
-                        _flush(k0, filled, entry, target, spot, weight, work, faces, attributes, planes,
+                    at = p + np.uint64(sample)
+                    nearest = buffer[at]
+                    if nearest == 0:
+                        continue
+                    t = buffer[at + _LANES]
+                    own = kind[np.uint64(t)]
+                    mask = 1 << sample
+                    for other in range(sample + 1, 4):
+                        at = p + np.uint64(other)
+                        if (abs(np.int64(buffer[at]) - nearest) < _STEP
+                                and (buffer[at + _LANES] == t or kind[np.uint64(buffer[at + _LANES])] == own)
+                                and left_over >> other & 1):
+                            mask |= 1 << other
+                    left_over &= ~mask
+                    n = np.uint64(filled[own])
+                    entry[own, n], target[own, n] = t, (row << _ROW_SHIFT) + (x << 4) + mask
+                    filled[own] = n + _P1
+                    if not ready[np.uint64(t)]:
+                        _prepare(t, vertices, faces, proj, cam, flat, planes, ready)
+                    if n + _P1 == _CHUNK:
+                        _flush(own, filled, entry, target, top, row_blocks, work, faces, attributes, planes,
                                material, flat, inside, powers, lamps, sky, view, colour)
-        for k0 in range(kinds):
-            if filled[k0]:
-                _flush(k0, filled, entry, target, spot, weight, work, faces, attributes, planes, material, flat,
+                    if left_over == 0:
+                        break
+        for own in range(kinds):
+            if filled[own]:
+                _flush(own, filled, entry, target, top, row_blocks, work, faces, attributes, planes, material, flat,
                        inside, powers, lamps, sky, view, colour)
         _finish(colour, row_blocks, top, bottom, left, right, behind, encode, transparent, picture)
 
 
-@njit(**_options)
-def _flush(kind, filled, entry, target, spot, weight, work, faces, attributes, planes, material, flat, inside, powers,
-           lamps, sky, view, colour):
+@njit(**OPTIONS)
+def _flush(kind, filled, entry, target, top, row_blocks, work, faces, attributes, planes, material, flat, inside,
+           powers, lamps, sky, view, colour):
     """Shade the chunk of a material and add it to the band's colours."""
     count = filled[kind]
-    _gather(count, kind, entry[kind], spot[kind], work, faces, attributes, planes, material, flat, kind == inside, powers)
+    _gather(count, kind, entry[kind], target[kind], top, work, faces, attributes, planes, material, flat,
+            kind == inside, powers)
     _light(count, material[kind], lamps, sky, view, work)
-    for i in range(count):
-        at, share = 4 * np.int64(target[kind, i]), weight[kind, i]
-        colour[at] += share * work[_R * CHUNK + i]
-        colour[at + 1] += share * work[_G * CHUNK + i]
-        colour[at + 2] += share * work[_B * CHUNK + i]
-        colour[at + 3] += share
+    places, pitch = target[kind], 16 * row_blocks
+    for i in range(np.uint64(count)):
+        place = places[i]
+        at = np.uint64((place >> _ROW_SHIFT) * pitch + 4 * ((place & _ROW_MASK) >> 4))
+        share = _SHARE[np.uint64(place & 15)]
+        colour[at] += share * work[_R + i]
+        colour[at + _P1] += share * work[_G + i]
+        colour[at + _P2] += share * work[_B + i]
+        colour[at + _P3] += share
     filled[kind] = 0
 
 
-@njit(**_options)
+@njit(**OPTIONS)
+def _cell(value, count):
+    """Return a value's place in a table, held inside as an integer: NaN must not lead out of it."""
+    return np.uint64(min(max(np.int32(min(value, np.float32(count))), 0), count - 1))
+
+
+@njit(**OPTIONS)
 def _finish(colour, row_blocks, top, bottom, left, right, behind, encode, transparent, picture):
-    """Put the band's colours over the background and encode them."""
-    one, scale = np.float32(1), np.float32(len(encode) - 1)
+    """Put the band's colours over the background and encode them, alpha in the highest byte."""
+    one, scale, half = np.float32(1), np.float32(len(encode) - 1), np.float32(0.5)
     for row in range(bottom - top):
+        y = np.uint64(top + row)
+        br, bg, bb = behind[y, _P0], behind[y, _P1], behind[y, _P2]
         for x in range(left, right):
-            at = 4 * (row * 4 * row_blocks + x)
-            cover = colour[at + 3]
-            if cover == 0.0:
+            at = np.uint64(4 * (row * 4 * row_blocks + x))
+            r, g, b, cover = colour[at], colour[at + _P1], colour[at + _P2], colour[at + _P3]
+            if cover == np.float32(0):
                 continue
-            if transparent:
-                picture[top + row, x, 3] = np.uint8(cover * np.float32(255) + np.float32(0.5))
-            for c in range(3):
-                value = colour[at + c]
-                value = value / cover if transparent else value + behind[top + row, c] * (one - cover)
-                value = min(max(value, np.float32(0)), one)
-                picture[top + row, x, c] = encode[np.int64(value * scale + np.float32(0.5))]
+            alpha = np.uint32(255)
+            if cover != one:
+                if transparent:
+                    r, g, b = r / cover, g / cover, b / cover
+                    alpha = np.uint32(cover * np.float32(255) + half)
+                else:
+                    free = one - cover
+                    r, g, b = r + free * br, g + free * bg, b + free * bb
+            red = np.uint32(encode[_cell(r * scale + half, len(encode))])
+            green = np.uint32(encode[_cell(g * scale + half, len(encode))])
+            blue = np.uint32(encode[_cell(b * scale + half, len(encode))])
+            picture[y, np.uint64(x)] = red | green << np.uint32(8) | blue << np.uint32(16) | alpha << np.uint32(24)
