@@ -11,7 +11,8 @@ folder = Path(sys.argv[1] if len(sys.argv) > 1 else ".")
 # facegen.load_clip reads the same from a YAML file, such as greeting.yaml beside this program.
 clip = facegen.load_clip({
     "keyframes": [{"t": 0.0, "pose": "neutral"}, {"t": 0.5, "pose": "happiness"}, {"t": 1.5, "pose": "happiness"}],
-    "events": [{"at": 0.7, "kind": "blink"}, {"at": 0.9, "eyes": {"yaw": 12}, "onset": 0.05, "apex": 0.3, "offset": 0.05}],
+    "events": [{"at": 0.7, "kind": "blink"},
+               {"at": 0.9, "eyes": {"yaw": 12}, "onset": 0.05, "apex": 0.3, "offset": 0.05}],
 }, idle=7)
 print("seconds, frames:", clip.duration, clip.frames(20))
 print("weights at 0.25 s:", {code: round(weight, 2) for code, weight in clip.units_at(0.25).items()})

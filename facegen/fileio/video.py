@@ -6,6 +6,7 @@ The only file that imports PyAV.
 from __future__ import annotations
 
 import itertools
+import math
 import os
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
@@ -23,6 +24,7 @@ from facegen.fileio.textfile import whole_file
 _PAPER = (255, 255, 255)
 # Frames from which a GIF's one palette is made: enough to see every colour of a face, few enough to be quick.
 _PALETTE_FRAMES = 16
+_PALETTE_PIXELS = 300_000
 _BT709 = 1      # the number of the colour standard of HD video, in FFmpeg's tables
 
 
@@ -224,7 +226,10 @@ def _palette(picture: Any, count: int) -> Any:
     chosen = np.unique(np.linspace(0, count - 1, min(count, _PALETTE_FRAMES)).round().astype(int))
     samples = [picture(int(k)) for k in chosen]
     width, height = samples[0].size
+    apart = math.ceil(math.sqrt(width * height * len(samples) / _PALETTE_PIXELS))
+    width, height = max(1, width // apart), max(1, height // apart)
     sheet = Image.new("RGB", (width, height * len(samples)))
     for k, sample in enumerate(samples):
-        sheet.paste(sample, (0, k * height))
-    return sheet.quantize(256, method=Image.Quantize.MEDIANCUT, kmeans=0)
+        sheet.paste(sample.resize((width, height), Image.Resampling.NEAREST), (0, k * height))
+    # A few rounds of k-means halve the largest errors, which are those of small things such as teeth.
+    return sheet.quantize(256, method=Image.Quantize.MEDIANCUT, kmeans=3)
