@@ -172,7 +172,7 @@ def _arrays(mesh: Mesh, camera: Camera, wanted: list[str], *, flat: bool) -> dic
            for name in wanted}
     projected = camera.project(mesh.vertices)[mesh.faces]
     # The triangles of the side that is seen: clockwise in pixels, whose y runs down.
-    back = _twice_area(projected) > 0
+    back = twice_area(projected) > 0
     normals = (face_normals if flat else vertex_normals)(mesh.vertices, mesh.faces) @ camera.rotation.T
     for rows, columns, ids in _seen(mesh, camera):
         if "triangle" in out:
@@ -225,7 +225,7 @@ def _held(weights: NDArray) -> NDArray[np.float64]:
     return weights / weights.sum(axis=1, keepdims=True)
 
 
-def _twice_area(projected: NDArray) -> NDArray[np.float64]:
+def twice_area(projected: NDArray) -> NDArray[np.float64]:
     """Return twice the signed area, in pixels, of projected triangles (m, 3 corners, 3)."""
     (ax, ay), (bx, by) = ((projected[:, k, :2] - projected[:, 0, :2]).T for k in (1, 2))
     return ax * by - bx * ay

@@ -29,8 +29,9 @@ def pass_paths(passes: Iterable[str], prefix: str | os.PathLike[str], *, exact: 
     Raises InputError for the names, FileError for the place.
     """
     names = check_passes(list(passes))
+    into = os.fspath(prefix).endswith(("/", os.sep))
     prefix = Path(prefix)
-    folder, stem = (prefix, "") if prefix.is_dir() else (prefix.parent, f"{prefix.name}.")
+    folder, stem = (prefix, "") if into or not prefix.name else (prefix.parent, f"{prefix.name}.")
     if not folder.is_dir():
         raise FileError(f"{prefix}: the folder {folder} does not exist; make it first")
     paths = {name: folder / f"{stem}{name}.{'json' if name in POINT_PASSES else 'png'}" for name in names}
@@ -46,7 +47,8 @@ def pass_paths(passes: Iterable[str], prefix: str | os.PathLike[str], *, exact: 
 def save_passes(passes: Passes, prefix: str | os.PathLike[str], *, exact: bool = False) -> dict[str, Path]:
     """Write passes as ``prefix.depth.png``, ``prefix.part.png`` ... and return the paths by name.
 
-    prefix: the files' common beginning, such as "out/smile"; in a folder that exists the files are called depth.png ...
+    prefix: the files' common beginning, such as "out/smile". One that ends in a slash is a folder, whose files are
+        called depth.png ...
     exact: also write ``prefix.passes.npz`` with every array as it is.
 
     depth: 16-bit grey, distance = offset + step * value, 0 is nothing. normal: 8-bit RGB, n = value / 127.5 - 1, black

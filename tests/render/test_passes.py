@@ -286,7 +286,7 @@ def test_files_give_back_what_was_saved(tmp_path, orthographic):
 def test_an_empty_view_is_saved_too(tmp_path):
     camera = render_passes(BALL, size=64).camera
     away = render_passes(BALL, BALL.vertices + np.array([0, 1000.0, 0]), camera=camera)
-    paths = save_passes(away, tmp_path)
+    paths = save_passes(away, f"{tmp_path}/")
     assert sorted(p.name for p in tmp_path.iterdir()) == ["depth.png", "normal.png", "part.png", "passes.json"]
     assert (np.asarray(Image.open(paths["depth"])) == 0).all()
 
