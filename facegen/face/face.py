@@ -6,7 +6,7 @@ no code. A face is a rig: ``pose(what)`` gives vertices, ``mesh(detail)`` what t
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cache, cached_property
 from pathlib import Path
@@ -22,6 +22,7 @@ from facegen.face.attach import attach
 from facegen.face.deformer import Array, Deformer
 from facegen.face.eye import eyeball_radius
 from facegen.face.folds import fold_field
+from facegen.face.landmarks import landmark_weights
 from facegen.face.loader import FaceData, read_face
 from facegen.facs.deformation import Deformation
 from facegen.facs.expressions import Resolution, resolve
@@ -66,6 +67,7 @@ class _Level:
     folds: Array                        # (f, n_surface, 3) displacement at amount one
     head_weight: Array                  # (n, 1)
     points: sparse.csr_array            # feature points on the surface, from the vertices
+    landmarks: sparse.csr_array         # the same for landmarks
 
 
 class Face:
@@ -89,12 +91,22 @@ class Face:
         ``vertices`` (n, 3) of ``mesh(detail)``, such as :meth:`pose` gives. A feature point is a vertex of the cage;
         the smooth surface runs a little inside the cage, and this is the place on the surface that belongs to it.
         """
-        points = self._level(detail).points
-        vertices = np.asarray(vertices, dtype=np.float64)
-        if vertices.shape != (points.shape[1], 3):
-            raise InputError(f"vertices: expected shape {(points.shape[1], 3)} at detail {detail}, "
-                             f"got {vertices.shape}")
-        return dict(zip(self._data.point_names, points @ vertices, strict=True))
+        return _placed(self._data.point_names, self._level(detail).points, vertices, detail)
+
+    @property
+    def landmarks(self) -> tuple[str, ...]:
+        """Names of the landmarks; none if no ``landmarks.yaml`` lies beside its ``face.yaml``."""
+        return tuple(self._data.landmarks)
+
+    def landmark_points(self, vertices: Array, *, detail: int = 2) -> dict[str, Array]:
+        """Return name -> place (3,), mm, of every landmark on a posed surface.
+
+        ``vertices`` (n, 3) of ``mesh(detail)``, such as :meth:`pose` gives. ::
+
+            points = face.landmark_points(face.pose("happiness"))
+            points["mouth_corner_L"] - points["mouth_corner_R"]
+        """
+        return _placed(self.landmarks, self._level(detail).landmarks, vertices, detail)
 
     def cage_sides(self, detail: int = 2) -> NDArray[np.bool_]:
         """Return which sides (m, 3) of the triangles of ``mesh(detail)`` run along the cage's edges.
@@ -296,7 +308,8 @@ class Face:
         mesh = merge([skin, *(a.mesh for a in d.attachments)])
         normals = vertex_normals(neutral, faces)
         folds = np.array([fold_field(f, neutral, normals) for f in d.folds.values()]).reshape(len(d.folds), n, 3)
-        return _Level(matrix, mesh, tuple(lids), folds, d.head_weight(mesh.vertices), self._points_on(mesh))
+        return _Level(matrix, mesh, tuple(lids), folds, d.head_weight(mesh.vertices), self._points_on(mesh),
+                      landmark_weights(d.landmarks, mesh, detail))
 
     def _points_on(self, mesh: Mesh) -> sparse.csr_array:
         """Return the weights (k, n) of a mesh's vertices that place the feature points on its surface."""
@@ -311,6 +324,15 @@ class Face:
                               sparse.csr_array(sparse.identity(len(mesh.vertices), format="csr")))
                 weights[row, near.indices] = near.data
         return sparse.csr_array(weights)
+
+
+def _placed(names: Iterable[str], weights: sparse.csr_array, vertices: Array, detail: int) -> dict[str, Array]:
+    """Return name -> place (3,) for the rows of ``weights`` (k, n)."""
+    vertices = np.asarray(vertices, dtype=np.float64)
+    if vertices.shape != (weights.shape[1], 3):
+        raise InputError(f"vertices: expected shape {(weights.shape[1], 3)} at detail {detail}, "
+                         f"got {vertices.shape}")
+    return dict(zip(names, weights @ vertices, strict=True))
 
 
 @cache

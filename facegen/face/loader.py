@@ -14,6 +14,7 @@ from scipy import sparse
 from facegen.face.attach import Attachment, attach
 from facegen.face.deformer import Array, Deformer, Jaw, Lids, Region, region_weights
 from facegen.face.folds import Fold
+from facegen.face.landmarks import Landmark, read_landmarks
 from facegen.facs.validate import Entry
 from facegen.facs.yamlfile import read_data
 from facegen.fileio.obj import load_obj
@@ -22,7 +23,8 @@ from facegen.geometry.subdivision import Subdivision, loop_levels
 
 REQUIRED = ("name", "source", "cage", "centre_O", "measures", "scales", "points", "regions", "jaw", "eyes",
             "lids", "head")
-OPTIONAL = ("sheets", "followers", "creases", "corners", "parts", "folds", "lid_follow", "head_half_height")
+OPTIONAL = ("sheets", "followers", "creases", "corners", "parts", "folds", "lid_follow", "head_half_height",
+            "landmarks")
 CARRIERS = ("skull", "skin", "jaw", "eye", "mouth")
 ROLES = ("input", "jaw", "fixed")
 SIDES = ("L", "R")
@@ -58,6 +60,7 @@ class FaceData:
     attachments: tuple[Attachment, ...]
     folds: Mapping[str, Fold]
     takes_input: NDArray[np.bool_]
+    landmarks: Mapping[str, Landmark]
 
 
 def read_face(path: Path) -> FaceData:
@@ -67,7 +70,7 @@ def read_face(path: Path) -> FaceData:
     n = len(cage.vertices)
 
     def index(entry: Entry) -> int:
-        return _whole(entry, n, f"a vertex of {top['cage'].text()}")
+        return entry.index(n, f"a vertex of {top['cage'].text()}")
 
     def indices(entry: Entry) -> NDArray[np.int32]:
         return np.array([index(e) for e in entry.each()], np.int32)
@@ -142,7 +145,7 @@ def read_face(path: Path) -> FaceData:
                   for e in _some(fields["movers"], None, "one mover or more")]
         lids.append(Lids(eyes[side], columns,
                          np.array([index(m[0]) for m in movers]),
-                         np.array([_whole(m[1], len(columns), "a column of the lid") for m in movers]),
+                         np.array([m[1].index(len(columns), "a column of the lid") for m in movers]),
                          np.array([m[2].choice(("upper", "lower"), "lid") == "lower" for m in movers]),
                          np.array([m[3].number(-1, 1) for m in movers])))
         rims.append(indices(fields["rims"]))
@@ -181,6 +184,10 @@ def read_face(path: Path) -> FaceData:
         if part not in parts:
             Entry(part, str(path), f"points.{names[row]}.part").choice(parts, "part")
     part_of = {row: part for part, row in with_parts.items()}
+    marks = path.parent / (top["landmarks"].text() if "landmarks" in top else "landmarks.yaml")
+    if "landmarks" in top and not marks.is_file():
+        raise top["landmarks"].wrong("the path of a file that exists")
+    landmarks = read_landmarks(marks, Path(top["cage"].text()).name, n, cage.faces, parts) if marks.exists() else {}
     folds = {}
     for name, entry in top["folds"].items() if "folds" in top else ():
         fields = entry.fields(required=("along", "width", "depth", "ridge", "toward"))
@@ -203,19 +210,11 @@ def read_face(path: Path) -> FaceData:
         place(head["pivot"]), head_weight,
         top["head_half_height"].number(1e-6) if "head_half_height" in top
         else float(np.ptp(cage.vertices[:, 1]) / 2),
-        attachments, folds, np.array(takes_input))
+        attachments, folds, np.array(takes_input), landmarks)
 
 
 def _integer(key: str) -> object:
     return int(key) if key.isdecimal() and len(key) < 10 else key
-
-
-def _whole(entry: Entry, count: int, what: str) -> int:
-    """Return a whole number in ``0..count - 1``."""
-    value = entry.number()
-    if not 0 <= value < count or value != int(value):
-        raise entry.wrong(f"{what}, 0..{count - 1}")
-    return int(value)
 
 
 def _some(entry: Entry, count: int | None, expected: str) -> list[Entry]:
