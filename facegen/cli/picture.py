@@ -72,9 +72,9 @@ def render(what: What, output: Out = None, face: FaceName = "akimoto", person: P
 
     shape = {"size": pixels, "view": angles, "detail": detail, "orthographic": orthographic,
              "shading": "flat" if flat else "smooth"}
+    found = render_passes(load_face(face), meaning, passes=wanted, **shape) if wanted else None
     picture = draw(load_face(face), meaning, **shape, background=ground, renderer=renderer, occlusion=occlusion,
                    shadows=shadows, wireframe=Wireframe(lines="cage") if cage else wireframe)
-    found = render_passes(load_face(face), meaning, passes=wanted, **shape) if wanted else None
     save_image(picture, output)
     files = {} if found is None else save_passes(found, output.with_suffix(""), exact=npz)
     if json:

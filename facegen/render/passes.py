@@ -154,9 +154,9 @@ def locate(places: dict[str, NDArray], mesh: Mesh, camera: Camera) -> Points:
 
 def _check_possible(name: str, thing: Mesh | Rig, mesh: Mesh) -> None:
     """Raise InputError for a pass that this thing cannot have."""
-    if name in _POINTS and not hasattr(thing, _POINTS[name]):
+    if name in _POINTS and not (hasattr(thing, _POINTS[name]) and len(getattr(thing, name, [name]))):
         raise InputError(f"passes: {name!r} needs a face that has them, e.g. facegen.load_face(), "
-                         f"got a {type(thing).__name__}")
+                         f"got {getattr(thing, 'name', None) or 'a ' + type(thing).__name__}")
     names = {"part": mesh.parts, "material": mesh.materials}.get(name, ())
     if len(names) > _MOST_NAMES:
         raise InputError(f"passes: {name!r} can tell {_MOST_NAMES} names apart, the mesh has {len(names)}; "

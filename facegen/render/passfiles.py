@@ -84,15 +84,11 @@ def points_data(points: Points) -> dict[str, dict[str, Any]]:
 def camera_data(camera: Camera) -> dict[str, Any]:
     """Return a camera as plain data, whole: with these numbers any place can be projected again.
 
-    ``world_to_camera``: (3, 4) to right, up and towards the viewer, the camera at 0, so depth is minus the third.
-    ``focal``: pixels, x = centre_x + focal * right / depth, y = centre_y - focal * up / depth; for an orthographic
-    camera ``scale`` (pixels a unit) takes the place of focal / depth.
+    ``extrinsics`` (3, 4) and ``intrinsics`` (3, 3): see `Camera`. Their axes are those of computer vision (y down, z
+    away from the viewer), so z is the depth.
     """
-    r = camera.rotation
-    shift = -r @ camera.target - np.array([0.0, 0.0, camera.distance])
-    lens = {"scale": camera.scale} if camera.orthographic else {"focal": camera.scale * camera.distance}
-    return {"orthographic": camera.orthographic, **lens, "centre": list(camera.offset),
-            "world_to_camera": np.column_stack([r, shift]).tolist()}
+    return {"projection": "orthographic" if camera.orthographic else "perspective",
+            "extrinsics": camera.extrinsics.tolist(), "intrinsics": camera.intrinsics.tolist()}
 
 
 def _save_png(name: str, array: NDArray, passes: Passes, path: Path) -> dict[str, Any]:

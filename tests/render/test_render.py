@@ -247,10 +247,12 @@ def test_the_smallest_and_the_longest_pictures(size, orthographic):
 
 
 def test_the_largest_picture():
-    triangle = Mesh.of([[-1, -1, 0], [1, -1, 0], [0, 1, 0]], [[0, 1, 2]])
-    alpha = render(triangle, size=4096, background="transparent", occlusion="off", renderer="soft", view=(0, 0))[..., 3]
+    triangle = np.array([[-1, -1, 0], [1, -1, 0], [0, 1, 0]], float)
+    camera = frame(triangle, size=(4096, 4096))
+    small = Mesh.of(triangle / 10, [[0, 1, 2]])                     # few pixels: quick, and yet the whole buffer
+    alpha = render(small, camera=camera, background="transparent", occlusion="off", renderer="soft")[..., 3]
     assert alpha.shape == (4096, 4096)
-    assert (alpha == 255).mean() == pytest.approx(0.84**2 / 2, rel=0.01)
+    assert (alpha == 255).mean() == pytest.approx(0.084**2 / 2, rel=0.02)
 
 
 def nan_ball():
@@ -282,7 +284,8 @@ def nan_ball():
     (lambda: render(nan_ball()), r"^thing: expected finite vertices, vertex 7 "),
     (lambda: render(Mesh.of(np.zeros((3, 3)), np.zeros((0, 3), int))), r"^thing: .*no triangles"),
     (lambda: render("happiness"), r"^thing: expected a Mesh or a face, got str"),
-    (lambda: render(with_isolated((0, np.nan, 0))), r"^thing: expected finite vertices, vertex 1106 is \[0\.0, nan, 0\.0\]"),
+    (lambda: render(with_isolated((0, np.nan, 0))),
+     r"^thing: expected finite vertices, vertex 1106 is \[0\.0, nan, 0\.0\]"),
     (lambda: render(BALL, size=0), r"^size: .*got 0"),
     (lambda: render(BALL, size=(100000, 100000)), r"^size: .*got \(100000, 100000\)"),
     (lambda: render(BALL, camera=frame(BALL.vertices, size=(16, 64))), r"^camera: expected pixels .*got \(16, 64\)"),
