@@ -78,13 +78,18 @@ def draw_wireframe(picture: NDArray[np.uint8], mesh: Mesh, camera: Camera, look:
     Blended in sRGB: thin dark lines keep the weight they have on paper, where linear light would thin them.
     """
     projected = camera.project(mesh.vertices)
-    lines = _side_lines(projected[mesh.faces][..., :2])
+    corners = projected[mesh.faces][..., :2]
+    lines = _side_lines(corners)
     area = twice_area(projected[mesh.faces])
     alone = _alone(mesh.faces, area < 0)
     reach = np.where(sides, look.width / 2 * (1 + alone), -np.inf).astype(np.float32)
     size = np.sqrt(np.abs(area)) / (_DENSE * look.width)
     thinned = np.ones_like(size) if look.lines == "cage" else np.minimum(size, 1.0)
     strength = np.where(alone, 1.0, thinned[:, None]).astype(np.float32)
+    # Lines are round where they meet: a triangle that only touches one there would leave a notch in it.
+    met = np.zeros(len(projected), bool)
+    met[mesh.faces[sides]] = met[mesh.faces[:, [1, 2, 0]][sides]] = True
+    joint = np.where(met[mesh.faces], look.width / 2, -np.inf).astype(np.float32)
     triangles = prepare(nearness_points(mesh.vertices, camera), mesh.faces, width=camera.width,
                         height=camera.height, samples=4)
     across = np.array(triangles.sample_x)
@@ -98,7 +103,10 @@ def draw_wireframe(picture: NDArray[np.uint8], mesh: Mesh, camera: Camera, look:
         place = np.stack([x + across[s], top + y + (s + 0.5) / 4], axis=1)
         line = lines[triangle]
         distance = np.abs(line[..., 0] * place[:, :1] + line[..., 1] * place[:, 1:] + line[..., 2])
-        inked = (strength[triangle] * np.clip(reach[triangle] + np.float32(0.5) - distance, 0, 1)).max(axis=1)
+        apart = corners[triangle] - place[:, None]
+        from_corner = np.sqrt((apart * apart).sum(axis=2))
+        within = np.maximum(reach[triangle] - distance, joint[triangle] - from_corner)
+        inked = (strength[triangle] * np.clip(within + np.float32(0.5), 0, 1)).max(axis=1)
         pixel = y * camera.width + x
         ink = np.bincount(pixel, inked, minlength=len(ids) * camera.width).reshape(len(ids), camera.width)
         # Where nothing is behind the picture, a pixel's colour is that of its covered samples alone.
