@@ -17,12 +17,15 @@ from numpy.typing import NDArray
 from facegen.errors import InputError
 from facegen.geometry.camera import Camera
 from facegen.geometry.mesh import Mesh
+from facegen.render.passes import twice_area
 from facegen.render.request import Rig, check_choice, check_colour
 from facegen.render.soft import nearness_points
 from facegen.render.zbuffer import prepare, scan
 
 LINES = ("mesh", "cage")
 _THINNEST, _THICKEST = 0.2, 50.0
+# Triangles smaller than this many line widths get thinner ink, so that dense parts do not turn black.
+_DENSE = 9.0
 # Samples held at once, whatever the picture's size.
 _BAND_SAMPLES = 2**19
 
@@ -75,8 +78,18 @@ def draw_wireframe(picture: NDArray[np.uint8], mesh: Mesh, camera: Camera, look:
     Blended in sRGB: thin dark lines keep the weight they have on paper, where linear light would thin them.
     """
     projected = camera.project(mesh.vertices)
-    lines = _side_lines(projected[mesh.faces][..., :2])
-    reach = np.where(sides, look.width / 2 * (1 + _alone(projected, mesh.faces)), -np.inf).astype(np.float32)
+    corners = projected[mesh.faces][..., :2]
+    lines = _side_lines(corners)
+    area = twice_area(projected[mesh.faces])
+    alone = _alone(mesh.faces, area < 0)
+    reach = np.where(sides, look.width / 2 * (1 + alone), -np.inf).astype(np.float32)
+    size = np.sqrt(np.abs(area)) / (_DENSE * look.width)
+    thinned = np.ones_like(size) if look.lines == "cage" else np.minimum(size, 1.0)
+    strength = np.where(alone, 1.0, thinned[:, None]).astype(np.float32)
+    # Lines are round where they meet: a triangle that only touches one there would leave a notch in it.
+    met = np.zeros(len(projected), bool)
+    met[mesh.faces[sides]] = met[mesh.faces[:, [1, 2, 0]][sides]] = True
+    joint = np.where(met[mesh.faces], look.width / 2, -np.inf).astype(np.float32)
     triangles = prepare(nearness_points(mesh.vertices, camera), mesh.faces, width=camera.width,
                         height=camera.height, samples=4)
     across = np.array(triangles.sample_x)
@@ -90,10 +103,12 @@ def draw_wireframe(picture: NDArray[np.uint8], mesh: Mesh, camera: Camera, look:
         place = np.stack([x + across[s], top + y + (s + 0.5) / 4], axis=1)
         line = lines[triangle]
         distance = np.abs(line[..., 0] * place[:, :1] + line[..., 1] * place[:, 1:] + line[..., 2])
-        inked = np.clip(reach[triangle] + np.float32(0.5) - distance, 0, 1).max(axis=1)
+        apart = corners[triangle] - place[:, None]
+        from_corner = np.sqrt((apart * apart).sum(axis=2))
+        within = np.maximum(reach[triangle] - distance, joint[triangle] - from_corner)
+        inked = (strength[triangle] * np.clip(within + np.float32(0.5), 0, 1)).max(axis=1)
         pixel = y * camera.width + x
-        area = (ids.shape[0], camera.width)
-        ink = np.bincount(pixel, inked, minlength=area[0] * area[1]).reshape(area)
+        ink = np.bincount(pixel, inked, minlength=len(ids) * camera.width).reshape(len(ids), camera.width)
         # Where nothing is behind the picture, a pixel's colour is that of its covered samples alone.
         covered = np.where(clear[top:top + rows], (ids >= 0).sum(axis=1), 4)
         share = look.opacity * ink / np.maximum(covered, 1)
@@ -114,16 +129,13 @@ def _side_lines(corners: NDArray) -> NDArray[np.float64]:
     return np.stack([a, b, far - (a * start[..., 0] + b * start[..., 1])], axis=2)
 
 
-def _alone(projected: NDArray, faces: NDArray) -> NDArray[np.bool_]:
-    """Return which sides (m, 3) have no seen triangle beyond them: borders and the outline.
+def _alone(faces: NDArray, front: NDArray) -> NDArray[np.bool_]:
+    """Return which sides (m, 3) have no triangle beyond them that is seen from the same side: borders, the outline.
 
-    Only one triangle draws their line, so it draws both halves.
+    Only one triangle draws their line, so it draws both halves. front: (m,) seen from outside.
     """
-    n = len(projected)
-    a, b, c = (projected[faces[:, k], :2] for k in range(3))
-    front = (b[:, 0] - a[:, 0]) * (c[:, 1] - a[:, 1]) - (b[:, 1] - a[:, 1]) * (c[:, 0] - a[:, 0]) < 0
     start, end = faces.astype(np.int64), faces[:, [1, 2, 0]].astype(np.int64)
-    edge = (np.minimum(start, end) * n + np.maximum(start, end)).ravel()
+    edge = (np.minimum(start, end) * (int(faces.max()) + 1) + np.maximum(start, end)).ravel()
     _, which = np.unique(edge, return_inverse=True)
     fronts = np.bincount(which, np.repeat(front, 3))[which].reshape(-1, 3)
     backs = np.bincount(which, np.repeat(~front, 3))[which].reshape(-1, 3)

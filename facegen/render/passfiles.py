@@ -29,8 +29,9 @@ def pass_paths(passes: Iterable[str], prefix: str | os.PathLike[str], *, exact: 
     Raises InputError for the names, FileError for the place.
     """
     names = check_passes(list(passes))
+    into = os.fspath(prefix).endswith(("/", os.sep))
     prefix = Path(prefix)
-    folder, stem = (prefix, "") if prefix.is_dir() else (prefix.parent, f"{prefix.name}.")
+    folder, stem = (prefix, "") if into or not prefix.name else (prefix.parent, f"{prefix.name}.")
     if not folder.is_dir():
         raise FileError(f"{prefix}: the folder {folder} does not exist; make it first")
     paths = {name: folder / f"{stem}{name}.{'json' if name in POINT_PASSES else 'png'}" for name in names}
@@ -46,7 +47,8 @@ def pass_paths(passes: Iterable[str], prefix: str | os.PathLike[str], *, exact: 
 def save_passes(passes: Passes, prefix: str | os.PathLike[str], *, exact: bool = False) -> dict[str, Path]:
     """Write passes as ``prefix.depth.png``, ``prefix.part.png`` ... and return the paths by name.
 
-    prefix: the files' common beginning, such as "out/smile"; in a folder that exists the files are called depth.png ...
+    prefix: the files' common beginning, such as "out/smile". One that ends in a slash is a folder, whose files are
+        called depth.png ...
     exact: also write ``prefix.passes.npz`` with every array as it is.
 
     depth: 16-bit grey, distance = offset + step * value, 0 is nothing. normal: 8-bit RGB, n = value / 127.5 - 1, black
@@ -82,15 +84,11 @@ def points_data(points: Points) -> dict[str, dict[str, Any]]:
 def camera_data(camera: Camera) -> dict[str, Any]:
     """Return a camera as plain data, whole: with these numbers any place can be projected again.
 
-    ``world_to_camera``: (3, 4) to right, up and towards the viewer, the camera at 0, so depth is minus the third.
-    ``focal``: pixels, x = centre_x + focal * right / depth, y = centre_y - focal * up / depth; for an orthographic
-    camera ``scale`` (pixels a unit) takes the place of focal / depth.
+    ``extrinsics`` (3, 4) and ``intrinsics`` (3, 3): see `Camera`. Their axes are those of computer vision (y down, z
+    away from the viewer), so z is the depth.
     """
-    r = camera.rotation
-    shift = -r @ camera.target - np.array([0.0, 0.0, camera.distance])
-    lens = {"scale": camera.scale} if camera.orthographic else {"focal": camera.scale * camera.distance}
-    return {"orthographic": camera.orthographic, **lens, "centre": list(camera.offset),
-            "world_to_camera": np.column_stack([r, shift]).tolist()}
+    return {"projection": "orthographic" if camera.orthographic else "perspective",
+            "extrinsics": camera.extrinsics.tolist(), "intrinsics": camera.intrinsics.tolist()}
 
 
 def _save_png(name: str, array: NDArray, passes: Passes, path: Path) -> dict[str, Any]:

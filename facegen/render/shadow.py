@@ -65,13 +65,17 @@ def shadow(mesh: Mesh, towards: ArrayLike) -> NDArray[np.float32]:
     normal[:, 2] = np.maximum(facing, _HELD)
     normal /= np.sqrt((normal * normal).sum(axis=1, keepdims=True))
     rows = np.intersect1d(np.flatnonzero(turned < 1), used)
-    spots = _disc(_TAPS) * (radius / texel)                                    # (taps, 2) texels
-    column, row = np.floor(place[rows, None] + spots).astype(np.intp).transpose(2, 0, 1)
-    # How far what is seen there stands out of the tangent plane, taken at the texel's centre, where it was seen.
-    off = np.stack([column + 0.5, row + 0.5], axis=-1) - place[rows, None]
-    out = ((off * normal[rows, None, :2]).sum(axis=2) * texel
-           + (heights[row, column] - local[rows, 2, None]) * normal[rows, None, 2])
-    hidden = np.clip(out / (STANDS_OUT * diagonal) - 1, 0, 1).mean(axis=1)
+    slope, hidden = normal[rows].T, np.zeros(len(rows))
+    x, y = place[rows].T
+    # How far what is seen at a tap stands out of the tangent plane, less what may stand out freely.
+    base = slope[2] * local[rows, 2] + STANDS_OUT * diagonal
+    for across, along in _disc(_TAPS) * (radius / texel):
+        column, row = np.floor(x + across), np.floor(y + along)
+        # Taken at the texel's centre, where it was seen.
+        out = ((column + 0.5 - x) * slope[0] + (row + 0.5 - y) * slope[1]) * texel
+        out += heights[row.astype(np.intp), column.astype(np.intp)] * slope[2] - base
+        hidden += np.clip(out / (STANDS_OUT * diagonal), 0, 1)
+    hidden /= _TAPS
     lit = np.ones(n, np.float32)
     lit[rows] = 1 - _DEEPEST * hidden * (1 - turned[rows])
     return lit

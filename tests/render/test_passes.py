@@ -159,6 +159,20 @@ def test_feature_points_are_where_the_camera_projects_them():
     assert np.median(np.abs(found["depth"][y, x] - points.depth[points.visible])) < 1.0
 
 
+def test_landmarks_are_where_the_camera_projects_them():
+    face = load_face()
+    found = render_passes(face, "surprise", passes=("landmarks",), size=128, view=(-25, 10), detail=1)
+    points = found["landmarks"]
+    places = face.landmark_points(face.pose("surprise", detail=1), detail=1)
+    assert points.names == tuple(places) == face.landmarks
+    np.testing.assert_array_equal(np.column_stack([points.xy, points.depth]),
+                                  found.camera.project(np.array(list(places.values()))))
+    seen = dict(zip(points.names, points.visible.tolist(), strict=True))
+    assert all(seen[name] for name in ("nose_tip", "chin", "mouth_top", "mouth_bottom", "eye_outer_R", "brow_mid_R"))
+    behind = render_passes(face, "surprise", passes=("landmarks",), size=128, view=(180, 0), detail=1)["landmarks"]
+    assert not behind.visible[points.names.index("nose_tip")]
+
+
 def test_feature_points_follow_the_pose_and_the_level():
     face = load_face()
     rest, smile = (face.feature_point_places(face.pose(what, detail=2)) for what in ("neutral", "happiness"))
@@ -205,11 +219,21 @@ def test_zero_area_triangles_hide_nothing_and_change_nothing():
         np.testing.assert_allclose(after[name], before[name], atol=1e-6)
 
 
+class Bare(Needle):
+    """A rig whose data hold no landmarks."""
+
+    name, landmarks = "bare", ()
+
+    def landmark_points(self, vertices, *, detail):
+        return {}
+
+
 @pytest.mark.parametrize(("call", "message"), [
     (lambda: render_passes(BALL, passes=["dept"]), r"^passes: expected .*got 'dept'; did you mean 'depth'"),
     (lambda: render_passes(BALL, passes="depth"), r"^passes: expected a list of names .*got 'depth'"),
     (lambda: render_passes(BALL, passes=[]), r"^passes: expected a list"),
     (lambda: render_passes(BALL, passes=["landmarks"]), r"^passes: 'landmarks' needs a face .*got a Mesh"),
+    (lambda: render_passes(Bare(), passes=["landmarks"]), r"^passes: 'landmarks' needs a face .*got bare"),
     (lambda: render_passes(BALL, passes=["feature_points"]), r"^passes: 'feature_points' needs a face"),
     (lambda: render_passes(BALL, shading="flatt"), r"^shading: .*did you mean 'flat'"),
     (lambda: render_passes(BALL, size=5), r"^size: "),
@@ -271,11 +295,13 @@ def test_files_give_back_what_was_saved(tmp_path, orthographic):
     assert [p["visible"] for p in points.values()] == found["feature_points"].visible.tolist()
     # The camera as data projects the places to where the points are.
     camera = about["camera"]
-    local = np.array([[*p["place"], 1] for p in points.values()]) @ np.array(camera["world_to_camera"]).T
-    zoom = camera["scale"] if orthographic else camera["focal"] / -local[:, 2]
-    np.testing.assert_allclose(camera["centre"][0] + zoom * local[:, 0], found["feature_points"].xy[:, 0], atol=1e-3)
-    np.testing.assert_allclose(camera["centre"][1] - zoom * local[:, 1], found["feature_points"].xy[:, 1], atol=1e-3)
-    np.testing.assert_allclose(-local[:, 2], found["feature_points"].depth, atol=1e-3)
+    local = np.array([[*p["place"], 1] for p in points.values()]) @ np.array(camera["extrinsics"]).T
+    assert camera["projection"] == ("orthographic" if orthographic else "perspective")
+    divided = local / (1 if orthographic else local[:, 2:])
+    divided[:, 2] = 1
+    xy = divided @ np.array(camera["intrinsics"]).T
+    np.testing.assert_allclose(xy[:, :2], found["feature_points"].xy, atol=1e-3)
+    np.testing.assert_allclose(local[:, 2], found["feature_points"].depth, atol=1e-3)
 
     with np.load(paths["arrays"]) as arrays:
         for name in ARRAY_PASSES:
@@ -286,7 +312,7 @@ def test_files_give_back_what_was_saved(tmp_path, orthographic):
 def test_an_empty_view_is_saved_too(tmp_path):
     camera = render_passes(BALL, size=64).camera
     away = render_passes(BALL, BALL.vertices + np.array([0, 1000.0, 0]), camera=camera)
-    paths = save_passes(away, tmp_path)
+    paths = save_passes(away, f"{tmp_path}/")
     assert sorted(p.name for p in tmp_path.iterdir()) == ["depth.png", "normal.png", "part.png", "passes.json"]
     assert (np.asarray(Image.open(paths["depth"])) == 0).all()
 
