@@ -17,7 +17,7 @@ from typing import Any
 from facegen.errors import FacegenError, InputError, TableError
 from facegen.face.face import face_names, load_face
 from facegen.facs.expression_table import is_path
-from facegen.facs.expressions import Resolution, resolve
+from facegen.facs.expressions import Resolution, full_name, resolve
 from facegen.facs.units import load_catalogue
 from facegen.facs.validate import Entry
 from facegen.facs.yamlfile import read_data
@@ -225,7 +225,7 @@ class _Reader:
         if key == "pose":
             if not isinstance(value, (str, int, Mapping)) or isinstance(value, bool):
                 raise entry.wrong("an expression, a FACS script, a file, or a mapping of units or movements")
-            return value if isinstance(value, Mapping) else self._at_home(str(value))
+            return value if isinstance(value, Mapping) else self._at_home(full_name(str(value)))
         if key == "person":
             nobody = value is None or (isinstance(value, str) and value.strip().casefold() in _NOBODY)
             return None if nobody else self._at_home(entry.text())
