@@ -55,6 +55,13 @@ def presets() -> tuple[str, ...]:
     return tuple(sorted(path.stem for path in (tables_dir() / "presets").glob("*.yaml")))
 
 
+def full_name(what: str) -> str:
+    """Return a preset's full name for its unmistakable end: figure-8 for akimoto-1986-figure-8."""
+    word = "-".join(what.split()).replace("_", "-").casefold()
+    found = [name for name in presets() if name.endswith(f"-{word}") and not word.isdigit()]
+    return found[0] if len(found) == 1 else what
+
+
 def resolve(what: What, *, person: str | Path | Person | None = None, intensity: float = 1.0,
             units: UnitTable | None = None, expressions: ExpressionTable | None = None) -> Resolution:
     """Return what ``what`` means for a face.
