@@ -129,7 +129,8 @@ def save_clip(clip: Clip, path: str | os.PathLike[str], *, fps: float = 25.0, si
         rig.controls(raw)               # a point that this face lacks is said now
     target = _Target(Path(path), size, fps)
     camera = frame(mesh.vertices, _reach(rig, clip, frame(mesh.vertices, size=size, view=view)), size=size, view=view)
-    shot = Shot(clip, float(fps), count, name, level, background, choose(renderer), (camera,))
+    shot = Shot(clip, float(fps), count, name, level, background,
+                choose(renderer, pictures=count, pixels=size[0] * size[1]), (camera,))
     return target.fill(shot, workers, step)
 
 
@@ -159,7 +160,8 @@ def save_turn(what: Any, path: str | os.PathLike[str], *, seconds: float = 4.0, 
     posed = rig.pose(pose, detail=level)
     target = _Target(Path(path), size, fps)
     cameras = _orbit(np.concatenate([mesh.vertices, posed]), size, [(yaw, pitch) for yaw in yaws])
-    return target.fill(Shot(pose, float(fps), count, name, level, background, choose(renderer), cameras), workers, step)
+    chosen = choose(renderer, pictures=count, pixels=size[0] * size[1])
+    return target.fill(Shot(pose, float(fps), count, name, level, background, chosen, cameras), workers, step)
 
 
 def _prepared(face: object, size: tuple[int, int], view: tuple[float, float], detail: int | None, background: Any,
