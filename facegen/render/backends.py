@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable
 from importlib import import_module
+from importlib.util import find_spec
 from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
+from facegen.errors import InputError
 from facegen.geometry.camera import Camera
 from facegen.geometry.mesh import Mesh
 from facegen.render.request import Look, check_choice
@@ -22,19 +25,35 @@ class Backend(Protocol):
         """Return the picture (h, w, 4) of checked vertices (n, 3)."""
 
 
-# Name -> where it lives. Imported when asked for: two of them need packages that not everybody has.
+# Name -> where it lives. Imported when asked for: all but the first need packages that not everybody has.
 _HOMES = {
     "soft": ("facegen.render.soft", "SoftBackend"),
     "fast": ("facegen.render.fast", "FastBackend"),
+    "gl": ("facegen.render.gl", "GlBackend"),
 }
+# Name -> the package without which it cannot be; the extra of facegen that brings it has the renderer's name.
+_NEEDS = {"fast": "numba"}
 
 RENDERERS = ("auto", *_HOMES)
+# A single picture of fewer pixels is finished by NumPy before the compiled renderer has been loaded.
+_WORTH_LOADING = 1500 * 1500
 
 
 def choose(renderer: str, *, once: bool = False, pixels: int = 0) -> str:
-    """Return the name of the renderer to use; InputError for an unknown one."""
+    """Return the name of the renderer to use; InputError for one that is unknown or whose package is missing.
+
+    "auto" is the compiled renderer where numba is installed. For a single picture (``once``) it must be worth its
+    start too: loaded already, or the picture large.
+    """
     check_choice("renderer", renderer, RENDERERS)
-    return "soft" if renderer == "auto" else renderer
+    if renderer == "auto":
+        loaded = _HOMES["fast"][0] in sys.modules
+        worth = loaded or not once or pixels >= _WORTH_LOADING
+        return "fast" if worth and find_spec("numba") else "soft"
+    if renderer in _NEEDS and find_spec(_NEEDS[renderer]) is None:
+        raise InputError(f"renderer: {renderer!r} needs the package {_NEEDS[renderer]}, which is not installed: "
+                         f'pip install "facegen[{renderer}]", or leave renderer out')
+    return renderer
 
 
 def load(name: str) -> Callable[[Mesh, Camera, Scene, Look], Backend]:

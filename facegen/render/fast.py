@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from functools import cache
 
@@ -11,9 +12,17 @@ from numpy.typing import NDArray
 
 from facegen.geometry.camera import Camera
 from facegen.geometry.mesh import Mesh
-from facegen.geometry.normals import vertex_normals
-from facegen.render import kernels
-from facegen.render.occlusion import light_shares, visibility
+from facegen.render import bake_kernels, kernels
+from facegen.render.occlusion import (
+    DIRECTIONS,
+    GRID,
+    POINTS_A_CELL,
+    directions,
+    frame_of,
+    in_cells,
+    light_lobes,
+    sequence,
+)
 from facegen.render.request import Look
 from facegen.render.scene import Scene
 from facegen.render.shading import CAVITY, DARKEST, light_directions, material_rows, srgb_table, to_srgb, unit
@@ -50,18 +59,18 @@ class FastBackend:
         self._blank = np.tile(ground[:, None, :], (1, camera.width, 1))
         if self._transparent:
             self._blank[:] = 0
-        self._towards = towards @ camera.rotation
-        self._spreads = np.array([lamp.spread for lamp in scene.lights])
-        self._light = np.ones((n, 1 + lights), np.float32)
-        if look.occlusion == "neutral":
-            normals = vertex_normals(neutral.vertices, neutral.faces)
-            self._light = light_shares(visibility(neutral), normals, neutral.faces, self._towards, self._spreads)
+        self._lobes, self._faint = light_lobes(towards @ camera.rotation,
+                                               np.array([lamp.spread for lamp in scene.lights]))
         bands = -(-camera.height // kernels.BAND_ROWS)
-        self._threads = 1 if camera.width * camera.height < _WORTH_THREADS else min(_cores(), bands)
+        small = camera.width * camera.height < _WORTH_THREADS
+        self._threads = 1 if small else min(look.threads or _cores(), bands)
         self._proj, self._snapped, self._depth = np.empty((n, 3)), np.empty((n, 2), np.int32), np.empty(n)
         self._kind, self._first, self._last = np.empty(m, np.int16), np.empty(m, np.int32), np.empty(m, np.int32)
         self._starts = np.empty(bands + 1, np.int64)
         self._scratch = [_Scratch(n, m, lights) for _ in range(self._threads)]
+        self._light = np.ones((n, 1 + lights), np.float32)
+        if look.occlusion == "neutral":
+            self._light = self._baked(neutral.vertices)[0]
 
     def draw(self, vertices: NDArray[np.float64]) -> NDArray[np.uint8]:
         """Return the picture (h, w, 4) of checked vertices (n, 3)."""
@@ -73,10 +82,7 @@ class FastBackend:
                                       self._starts)
         light, normals = self._light, None
         if self.look.occlusion == "posed":
-            normals = np.empty_like(vertices)
-            kernels.all_normals(vertices, self._adjacency, self._ring, normals)
-            light = light_shares(visibility(self.neutral.with_vertices(vertices)), normals, self._faces,
-                                 self._towards, self._spreads)
+            light, normals = self._baked(vertices)
             normals = normals @ self.camera.rotation.T
         picture = self._blank.copy()
 
@@ -90,11 +96,29 @@ class FastBackend:
                 self._lamps, self._sky, self._view, _powers(), srgb_table(), self._behind,
                 self._transparent, picture.view(np.uint32)[..., 0])
 
-        if self._threads == 1:
-            bands(0)
-        else:
-            list(_pool(self._threads).map(bands, range(self._threads)))
+        self._share_out(bands)
         return picture
+
+    def _baked(self, vertices: NDArray[np.float64]) -> tuple[NDArray[np.float32], NDArray[np.float64]]:
+        """Return each vertex's light shares (n, 1 + lights) and normal (n, 3) in world axes."""
+        normals = np.empty((len(vertices), 3))
+        kernels.all_normals(vertices, self._adjacency, self._ring, normals)
+        local, facing = in_cells(vertices), normals.astype(np.float32)
+        points = bake_kernels.surface_points(local, self._faces, _sequence())
+        seen = np.empty((len(vertices), DIRECTIONS), np.float32)
+        self._share_out(lambda thread: bake_kernels.visible(points, local, facing, _frames(), thread, self._threads,
+                                                            seen))
+        light = np.empty((len(vertices), 1 + len(self._lamps)), np.float32)
+        bake_kernels.shares(seen, facing, self._faces, np.ascontiguousarray(directions().T),
+                            np.ascontiguousarray(self._lobes.T), self._faint, light)
+        return light, normals
+
+    def _share_out(self, work: Callable[[int], None]) -> None:
+        """Have each thread do its share; the kernels let go of the interpreter's lock."""
+        if self._threads == 1:
+            work(0)
+        else:
+            list(_pool(self._threads).map(work, range(self._threads)))
 
 
 class _Scratch:
@@ -128,6 +152,17 @@ def _powers() -> NDArray[np.float32]:
     """Return how much ambient light comes in by openness 0..1, as `shading.shade` computes it."""
     openness = np.arange(_POWER_STEPS + 2) / _POWER_STEPS
     return (DARKEST + (1 - DARKEST) * openness**CAVITY).astype(np.float32)
+
+
+@cache
+def _frames() -> NDArray[np.float32]:
+    return np.stack([frame_of(way) for way in directions()[:DIRECTIONS // 2]])
+
+
+@cache
+def _sequence() -> NDArray[np.float32]:
+    # No triangle asks for more: the grid itself has no more cells.
+    return sequence(int(GRID * GRID * POINTS_A_CELL))
 
 
 @cache

@@ -16,13 +16,13 @@ import math
 import numpy as np
 from numba import njit
 
-from facegen.render.shading import BOUNCE, CAVITY, DARKEST, INSIDE_LIGHT, SHOULDER, WINDOW_FULL, WINDOW_GONE
+from facegen.render.shading import BOUNCE, INSIDE_LIGHT, SHOULDER, WINDOW_FULL, WINDOW_GONE
 from facegen.render.soft import DEPTH_STEP
 from facegen.render.zbuffer import PATTERNS
 
 # Because NaN and infinity must keep their meaning, nnan and ninf are left out.
 _FAST = {"contract", "reassoc", "arcp", "nsz", "afn"}
-_options = {"cache": True, "nogil": True, "fastmath": _FAST, "error_model": "numpy"}
+OPTIONS = {"cache": True, "nogil": True, "fastmath": _FAST, "error_model": "numpy"}
 
 BAND_ROWS = 16
 CHUNK = 256
@@ -54,9 +54,9 @@ _CHUNK = np.uint64(CHUNK)
 _P0, _P1, _P2, _P3, _P4, _P5, _P6, _P7, _P8, _P9, _P10, _P11, _P12, _P13 = (np.uint64(k) for k in range(14))
 
 
-@njit(**_options)
+@njit(**OPTIONS)
 def project(vertices, cam, proj, snapped, depth):
-    """Fill proj (n, 3: pixel x, y, depth in units), snapped (n, 2) sub-pixels and depth (n,), -1 before the near plane."""
+    """Fill proj (n, 3): pixel x, y, depth in units; snapped (n, 2) sub-pixels; depth (n,): -1 before the near plane."""
     ortho, near = cam[16] != 0.0, cam[17]
     low, high = np.inf, -np.inf
     for v in range(len(vertices)):
@@ -77,7 +77,7 @@ def project(vertices, cam, proj, snapped, depth):
         depth[v] = (0.01 + 0.98 * (depth[v] - low) / span) * DEPTHS if proj[v, 2] > near else -1.0
 
 
-@njit(**_options)
+@njit(**OPTIONS)
 def bin_triangles(faces, snapped, depth, width, height, face_materials, inside, kind, first, last, starts):
     """Fill kind (m,) with materials (``inside`` for back faces) and return the triangles of each band, in order."""
     bands = len(starts) - 1
@@ -113,7 +113,7 @@ def bin_triangles(faces, snapped, depth, width, height, face_materials, inside, 
 def _rows(integer):
     """Return the loop over a triangle's blocks for edge functions of one integer type."""
 
-    @njit(**_options)
+    @njit(**OPTIONS)
     def rows(buffer, offsets, depths, at, pitch, height, count, e0, e1, e2, dx0, dx1, dx2, dy0, dy1, dy2, z, zx, zy,
              triangle):
         s0, s1, s2 = integer(-1024 * dy0), integer(-1024 * dy1), integer(-1024 * dy2)
@@ -137,7 +137,7 @@ def _rows(integer):
     return rows
 
 
-@njit(**_options)
+@njit(**OPTIONS)
 def _wrapped(value):
     """Return a depth's lower 32 bits: sums of such parts are right wherever the whole is in range."""
     return np.int32(np.int64(value))
@@ -146,7 +146,7 @@ def _wrapped(value):
 _narrow, _wide = _rows(np.int32), _rows(np.int64)
 
 
-@njit(**_options)
+@njit(**OPTIONS)
 def _scan(buffer, offsets, offsets64, depths, faces, snapped, depth, triangle, top, bottom, width, columns):
     """Draw a triangle into the band's rows top..bottom; ``columns`` (2,) grows to the blocks touched.
 
@@ -206,7 +206,7 @@ def _scan(buffer, offsets, offsets64, depths, faces, snapped, depth, triangle, t
               dx0, dx1, dx2, dy0, dy1, dy2, z, zx, zy, np.int32(triangle))
 
 
-@njit(**_options)
+@njit(**OPTIONS)
 def _angle(sine, cosine):
     """Return atan2 for a sine of 0 or more, within 2e-6: what weighs a triangle needs no more.
 
@@ -223,7 +223,7 @@ def _angle(sine, cosine):
     return math.pi - angle if cosine < 0.0 else angle
 
 
-@njit(**_options)
+@njit(**OPTIONS)
 def _normal(vertices, starts, ring, v, out):
     """Write the unit normal of a vertex, world axes: its triangles' normals, each by its angle there."""
     x, y, z = vertices[v, 0], vertices[v, 1], vertices[v, 2]
@@ -242,15 +242,16 @@ def _normal(vertices, starts, ring, v, out):
     out[0], out[1], out[2] = nx * scale, ny * scale, nz * scale
 
 
-@njit(**_options)
+@njit(**OPTIONS)
 def all_normals(vertices, starts, ring, normals):
     """Fill normals (n, 3) of all vertices, world axes."""
     for v in range(len(vertices)):
         _normal(vertices, starts, ring, v, normals[v])
 
 
-@njit(**_options)
-def _prepare(t, vertices, faces, proj, cam, flat, starts, ring, known, attributes, vertex_ready, planes, ready, scratch):
+@njit(**OPTIONS)
+def _prepare(t, vertices, faces, proj, cam, flat, starts, ring, known, attributes, vertex_ready, planes, ready,
+             scratch):
     """Work out what shading asks of a triangle: corner weights as functions of the pixel, and normals.
 
     The functions are those of `shading._corner_weights`. planes (m, 14): nine coefficients, the origin's x and y,
@@ -288,7 +289,7 @@ def _prepare(t, vertices, faces, proj, cam, flat, starts, ring, known, attribute
     ready[t] = 1
 
 
-@njit(**_options)
+@njit(**OPTIONS)
 def _gather(count, kind, entry, target, top, work, faces, attributes, planes, material, flat, back, powers):
     """Interpolate normal and light shares of a chunk's points into the work array."""
     shares = np.uint64(attributes.shape[1] - 4)
@@ -333,7 +334,7 @@ def _gather(count, kind, entry, target, top, work, faces, attributes, planes, ma
             work[_FREE + i] = powers[cell] + (at - np.float32(np.int32(cell))) * (powers[cell + _P1] - powers[cell])
 
 
-@njit(**_options)
+@njit(**OPTIONS)
 def _light(count, look, lamps, sky, view, work):
     """Turn a chunk's normals and shares into colours, rows _R, _G, _B: see `shading.shade`."""
     count = np.uint64(count)
@@ -410,7 +411,7 @@ def _light(count, look, lamps, sky, view, work):
             work[row + i] = min(value, shoulder) + above * room / (above + room)
 
 
-@njit(**_options)
+@njit(**OPTIONS)
 def draw_bands(start, stop, step, items, starts, vertices, faces, proj, snapped, depth, kind, inside, cam, flat, known,
                adjacency, ring, attributes, vertex_ready, planes, ready, material, lamps, sky, view, powers,
                encode, behind, transparent, picture):
@@ -480,9 +481,9 @@ def draw_bands(start, stop, step, items, starts, vertices, faces, proj, snapped,
         _finish(colour, row_blocks, top, bottom, left, right, behind, encode, transparent, picture)
 
 
-@njit(**_options)
-def _flush(kind, filled, entry, target, top, row_blocks, work, faces, attributes, planes, material, flat, inside, powers,
-           lamps, sky, view, colour):
+@njit(**OPTIONS)
+def _flush(kind, filled, entry, target, top, row_blocks, work, faces, attributes, planes, material, flat, inside,
+           powers, lamps, sky, view, colour):
     """Shade the chunk of a material and add it to the band's colours."""
     count = filled[kind]
     _gather(count, kind, entry[kind], target[kind], top, work, faces, attributes, planes, material, flat,
@@ -500,13 +501,13 @@ def _flush(kind, filled, entry, target, top, row_blocks, work, faces, attributes
     filled[kind] = 0
 
 
-@njit(**_options)
+@njit(**OPTIONS)
 def _cell(value, count):
     """Return a value's place in a table, held inside as an integer: NaN must not lead out of it."""
     return np.uint64(min(max(np.int32(min(value, np.float32(count))), 0), count - 1))
 
 
-@njit(**_options)
+@njit(**OPTIONS)
 def _finish(colour, row_blocks, top, bottom, left, right, behind, encode, transparent, picture):
     """Put the band's colours over the background and encode them, alpha in the highest byte."""
     one, scale, half = np.float32(1), np.float32(len(encode) - 1), np.float32(0.5)

@@ -21,17 +21,17 @@ DIRECTIONS = 64
 # Cells along the diameter of a sphere round the mesh: 2 mm on a head.
 GRID = 176
 # Points of the surface a cell's area, so that few cells stay empty where the surface faces the view.
-_POINTS_A_CELL = 2.0
+POINTS_A_CELL = 2.0
 # A vertex is lifted off its own surface by this many cells, and a slanted surface is allowed to rise by
 # this many cells within one cell before it counts as hiding itself.
-_LIFT = 0.7
-_SLOPE = 0.7
+LIFT = 0.7
+SLOPE = 0.7
 # ... up to this cosine; beyond it the slope would hide nothing at all.
-_STEEPEST = 0.35
+STEEPEST = 0.35
 # From barely hidden to hidden, in cells: softens the steps of the grid.
-_SOFT = 1.5
+SOFT = 1.5
 # Directions flatter over the surface than this (cosine) say little: the surface's own slope decides there.
-_FLATTEST = 0.08
+FLATTEST = 0.08
 _KEPT = 8
 # Cells left free round the grid, for the lift.
 _BORDER = 2
@@ -74,31 +74,40 @@ def light_shares(seen: NDArray[np.float32], normals: NDArray, faces: NDArray, to
     and where its lobe has none the openness stands in.
     """
     ways = directions()
-    cosine = np.asarray(normals, np.float32) @ ways.T - np.float32(_FLATTEST)
+    cosine = np.asarray(normals, np.float32) @ ways.T - np.float32(FLATTEST)
     np.maximum(cosine, 0, out=cosine)
     ambient = np.einsum("nd,nd->n", seen, cosine) / np.maximum(cosine.sum(axis=1), np.float32(1e-6))
-    lobes = np.exp(np.asarray(spreads, np.float32) * (ways @ np.asarray(towards, np.float32).T - 1))
+    lobes, faint = light_lobes(towards, spreads)
     above = np.minimum(4 * cosine, 1)
-    faint = np.float32(0.02) * lobes.sum(axis=0)
     reach = ((seen * above) @ lobes + faint * ambient[:, None]) / (above @ lobes + faint)
     return _smoothed(np.concatenate([ambient[:, None], reach], axis=1), faces)
 
 
-def _bake(mesh: Mesh) -> NDArray[np.float32]:
-    vertices = mesh.vertices
+def light_lobes(towards: NDArray, spreads: NDArray) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """Return how much each direction counts for each light (64, k), and the weight (k,) of openness beside them."""
+    lobes = np.exp(np.asarray(spreads, np.float32) * (directions() @ np.asarray(towards, np.float32).T - 1))
+    return lobes, np.float32(0.02) * lobes.sum(axis=0)
+
+
+def in_cells(vertices: NDArray[np.float64]) -> NDArray[np.float32]:
+    """Return vertices (n, 3) in cells of the grid, whose middle is the mesh's centre."""
     centre = (vertices.min(axis=0) + vertices.max(axis=0)) / 2
     radius = np.sqrt(((vertices - centre) ** 2).sum(axis=1).max()) or 1.0
-    # All lengths in cells from here on; the grid's middle is the mesh's centre.
-    local = ((vertices - centre) * ((GRID / 2 - _BORDER) / radius)).astype(np.float32)
+    return ((vertices - centre) * ((GRID / 2 - _BORDER) / radius)).astype(np.float32)
+
+
+def _bake(mesh: Mesh) -> NDArray[np.float32]:
+    vertices = mesh.vertices
+    local = in_cells(vertices)
     normals = vertex_normals(vertices, mesh.faces).astype(np.float32)
     points = _surface_points(local, mesh.faces).T.copy()
-    tested = (local + np.float32(_LIFT) * normals).T.copy()
+    tested = (local + np.float32(LIFT) * normals).T.copy()
     seen = np.empty((DIRECTIONS, len(vertices)), np.float32)
     half = DIRECTIONS // 2
     for k, way in enumerate(directions()[:half]):
-        axes = _axes(way)
-        slant = np.clip(np.abs(normals @ way), np.float32(_STEEPEST), 1)
-        allowance = np.float32(_SLOPE) * np.sqrt(1 - slant**2) / slant
+        axes = frame_of(way)
+        slant = np.clip(np.abs(normals @ way), np.float32(STEEPEST), 1)
+        allowance = np.float32(SLOPE) * np.sqrt(1 - slant**2) / slant
         index, height = _cells(axes @ points)
         own_index, own_height = _cells(axes @ tested)
         for row, sign in ((k, 1), (k + half, -1)):                # the opposite view shares the cells
@@ -106,7 +115,7 @@ def _bake(mesh: Mesh) -> NDArray[np.float32]:
             np.maximum.at(depth, index, height if sign > 0 else -height)
             _fill_holes(depth.reshape(GRID, GRID))
             above = depth[own_index] - sign * own_height - allowance
-            seen[row] = 1 - np.clip(above / np.float32(_SOFT), 0, 1)
+            seen[row] = 1 - np.clip(above / np.float32(SOFT), 0, 1)
     return np.ascontiguousarray(seen.T)
 
 
@@ -118,17 +127,22 @@ def _surface_points(vertices: NDArray, faces: NDArray) -> NDArray[np.float32]:
     # Each triangle has the same points whatever its place in the list and its first corner.
     a, b, c = (vertices[corner] for corner in np.sort(faces, axis=1).T)
     area = np.sqrt((np.cross(b - a, c - a) ** 2).sum(axis=1)) / 2
-    count = np.ceil(area * _POINTS_A_CELL).astype(np.int64)
+    count = np.ceil(area * POINTS_A_CELL).astype(np.int64)
     owner = np.repeat(np.arange(len(faces)), count)
-    k = np.arange(len(owner)) - np.repeat(np.cumsum(count) - count, count) + 0.5
-    u, v = ((k * step % 1).astype(np.float32)[:, None] for step in (0.7548776662466927, 0.5698402909980532))
-    over = u + v > 1
-    u, v = np.where(over, 1 - u, u), np.where(over, 1 - v, v)
+    k = np.arange(len(owner)) - np.repeat(np.cumsum(count) - count, count)
+    u, v = sequence(int(count.max(initial=0)))[k].T[..., None]
     inner = a[owner] + u * (b - a)[owner] + v * (c - a)[owner]
     return np.concatenate([vertices, inner])
 
 
-def _axes(way: NDArray[np.float32]) -> NDArray[np.float32]:
+def sequence(count: int) -> NDArray[np.float32]:
+    """Return the first points (count, 2) that fill a triangle evenly, as shares of its two edges."""
+    u, v = np.multiply.outer((0.7548776662466927, 0.5698402909980532), np.arange(count) + 0.5) % 1
+    over = u + v > 1
+    return np.stack([np.where(over, 1 - u, u), np.where(over, 1 - v, v)], axis=1).astype(np.float32)
+
+
+def frame_of(way: NDArray[np.float32]) -> NDArray[np.float32]:
     """Return rows (across, along, towards): a frame whose last axis is the direction."""
     helper = np.array([0, 0, 1], np.float32) if abs(way[2]) < 0.7 else np.array([1, 0, 0], np.float32)
     across = np.cross(helper, way)

@@ -31,6 +31,8 @@ class Renderer:
     camera: a ready camera instead of size, view and orthographic. scene: other lights and materials.
     around: vertices (k, 3) that must be in the picture too, such as all frames of a clip.
     renderer: "auto", or one of `facegen.render.RENDERERS` by name. All draw the same picture.
+    threads: how many of this process's threads may work on one picture; None is one a core. Give 1 where several
+        processes draw.
 
     ``camera``, ``mesh`` (the neutral), ``detail`` and ``renderer`` (the name of the one chosen) can be read.
 
@@ -44,9 +46,9 @@ class Renderer:
                  view: tuple[float, float] = (0.0, 0.0), detail: int | None = None,
                  background: str | Sequence[float] = "plain", shading: str = "smooth", occlusion: str = "posed",
                  orthographic: bool = False, camera: Camera | None = None, scene: Scene | None = None,
-                 around: ArrayLike | None = None, renderer: str = "auto") -> None:
+                 around: ArrayLike | None = None, renderer: str = "auto", threads: int | None = None) -> None:
         size, view = check_size(size), check_view(view)
-        look = check_look(background=background, shading=shading, occlusion=occlusion)
+        look = check_look(background=background, shading=shading, occlusion=occlusion, threads=threads)
         name = choose(renderer)
         self.thing = thing
         self.mesh, self.detail = neutral_mesh(thing, detail=detail, size=size, view=view, orthographic=orthographic,
@@ -68,7 +70,8 @@ def render(thing: Mesh | Rig, pose: Any = None, *, size: int | tuple[int, int] =
            view: tuple[float, float] = (0.0, 0.0), detail: int | None = None,
            background: str | Sequence[float] = "plain", person: Any = None, intensity: float = 1.0,
            shading: str = "smooth", occlusion: str = "posed", orthographic: bool = False,
-           camera: Camera | None = None, scene: Scene | None = None, renderer: str = "auto") -> NDArray[np.uint8]:
+           camera: Camera | None = None, scene: Scene | None = None, renderer: str = "auto",
+           threads: int | None = None) -> NDArray[np.uint8]:
     """Return one picture as (height, width, 4) uint8, sRGB with straight alpha.
 
     pose: for a rig anything its ``pose`` takes ("happiness", "6C+12D", ...) or vertices (n, 3); for a mesh
@@ -81,7 +84,7 @@ def render(thing: Mesh | Rig, pose: Any = None, *, size: int | tuple[int, int] =
         pixels = facegen.render(facegen.load_face(), "happiness", size=512, view=(30, 0))
     """
     size, view = check_size(size), check_view(view)
-    look = check_look(background=background, shading=shading, occlusion=occlusion)
+    look = check_look(background=background, shading=shading, occlusion=occlusion, threads=threads)
     name = choose(renderer, once=True, pixels=size[0] * size[1])
     mesh, level = neutral_mesh(thing, detail=detail, size=size, view=view, orthographic=orthographic,
                                flat=look.flat, camera=camera)

@@ -36,19 +36,25 @@ class Rig(Protocol):
 
 @dataclass(frozen=True)
 class Look:
-    """How a mesh is drawn, whoever draws it. ``background``: "plain", "transparent" or sRGB (r, g, b)."""
+    """How a mesh is drawn, whoever draws it. ``background``: "plain", "transparent" or sRGB (r, g, b).
+
+    ``threads``: how many may work on one picture; None is as many as there are cores.
+    """
 
     background: str | tuple[float, float, float] = "plain"
     flat: bool = False
     occlusion: str = "posed"
+    threads: int | None = None
 
 
 def check_look(*, background: str | Sequence[float] = "plain", shading: str = "smooth",
-               occlusion: str = "posed") -> Look:
+               occlusion: str = "posed", threads: int | None = None) -> Look:
     """Return the look that was asked for or raise InputError."""
     check_choice("shading", shading, SHADINGS)
     check_choice("occlusion", occlusion, OCCLUSIONS)
-    return Look(_checked_background(background), shading == "flat", occlusion)
+    if threads is not None and (isinstance(threads, bool) or not isinstance(threads, (int, np.integer)) or threads < 1):
+        raise InputError(f"threads: expected a whole number of 1 or more, or None for all cores, got {threads!r}")
+    return Look(_checked_background(background), shading == "flat", occlusion, threads)
 
 
 def check_size(size: object) -> tuple[int, int]:
