@@ -208,14 +208,13 @@ def _vtk_window(module):
 class Pyrender:
     """pyrender's own scene and shaders; the vertices go into the buffer that pyrender made, interleaved as it does.
 
-    A new pyrender.Mesh a frame, its only documented way, is slower still. It always reads the depth back too.
+    A new pyrender.Mesh a frame, its only documented way, is slower still. It always reads the depth back too, and
+    PyOpenGL asks for errors after each call: with that switched off its EGL module does not import.
     """
 
     def __init__(self, head) -> None:
         os.environ.setdefault("PYOPENGL_PLATFORM", "egl")
         try:
-            import OpenGL
-            OpenGL.ERROR_CHECKING = False                           # a call after each call: not its fault
             import pyrender
             from OpenGL import GL
         except ImportError as error:
@@ -238,7 +237,7 @@ class Pyrender:
         place = np.linalg.inv(head["view"])
         self._scene.add(Fixed(znear=0.5 * float(head["distance"]), zfar=1.5 * float(head["distance"])), pose=place)
         for lamp in head["lights"]:
-            self._scene.add(pyrender.DirectionalLight(color=lamp[3:].astype(float), intensity=3.0),
+            self._scene.add(pyrender.DirectionalLight(color=lamp[3:].astype(float), intensity=2.0),
                             pose=place @ _looking_from(lamp[:3]))
         try:
             self._renderer = pyrender.OffscreenRenderer(int(head["size"]), int(head["size"]))
@@ -246,7 +245,8 @@ class Pyrender:
             raise Missing(f"pyrender finds no EGL: {error}") from error
         self._rows = np.column_stack([self._poses[0], self._normals[0], colours])
         self._renderer.render(self._scene, self._flags)
-        self.info = GL.glGetString(GL.GL_RENDERER) or ""
+        self._renderer._platform.make_current()
+        self.info = (GL.glGetString(GL.GL_RENDERER) or b"").decode()
 
     def draw(self, frame: int) -> NDArray[np.uint8]:
         self._rows[:, :3], self._rows[:, 3:6] = self._poses[frame], self._normals[frame]
