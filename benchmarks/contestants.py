@@ -29,8 +29,9 @@ class Facegen:
     """One of facegen's own renderers, used through its public door."""
 
     def __init__(self, head, *, renderer: str, occlusion: str, threads: int | None) -> None:
-        import facegen
         from heads import mesh_of
+
+        import facegen
         try:
             self._renderer = facegen.Renderer(mesh_of(head), size=int(head["size"]), renderer=renderer,
                                               occlusion=occlusion, background="transparent", threads=threads)

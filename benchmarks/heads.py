@@ -47,39 +47,35 @@ def save_whole(folder: Path, detail: int, size: int) -> Path:
 def refined(faces: NDArray, points: NDArray, triangles: int) -> tuple[NDArray, NDArray, sparse.csr_array]:
     """Return faces, the triangle each came from, and the matrix (new, old) of the vertices, cut by longest edges.
 
-    A round halves the longest edges of which no two share a triangle; each adds two triangles (one at a border).
+    A round halves the long edges that are the longest of all triangles they border; so no triangle is cut twice.
     """
     matrix, parents = sparse.csr_array(sparse.identity(len(points), format="csr")), np.arange(len(faces))
     while len(faces) < triangles:
         position = matrix @ points
         ends = np.sort(np.stack([faces, np.roll(faces, -1, axis=1)], axis=-1).reshape(-1, 2), axis=1)
-        edges, which = np.unique(ends, axis=0, return_inverse=True)
-        sides = [[] for _ in edges]
-        for slot, edge in enumerate(which.ravel()):
-            sides[edge].append(slot)
+        edges, edge_of = np.unique(ends, axis=0, return_inverse=True)
+        edge_of = edge_of.reshape(-1, 3)
         lengths = np.linalg.norm(position[edges[:, 0]] - position[edges[:, 1]], axis=1)
-        # At most half of the edges' lengths in a round: what is cut later may be a piece of what is cut now.
-        order = np.argsort(-lengths)[:np.count_nonzero(lengths > lengths.max() / 1.6)]
-        taken, halved, room = np.zeros(len(faces), bool), [], triangles - len(faces)
-        for edge in order:
-            touched = [slot // 3 for slot in sides[edge]]
-            if room > 0 and not taken[touched].any():
-                taken[touched] = True
-                halved.append(edge)
-                room -= len(touched)
-        n, new_faces, new_parents = len(position), [], []
-        faces = faces.copy()
-        for k, edge in enumerate(halved):
-            for slot in sides[edge]:
-                row, side = divmod(slot, 3)
-                a, b, c = np.roll(faces[row], -side)
-                faces[row] = a, n + k, c
-                new_faces.append((n + k, b, c))
-                new_parents.append(parents[row])
-        cut = np.repeat(np.arange(len(halved)), 2), edges[halved].ravel()
-        half = sparse.csr_array((np.full(2 * len(halved), 0.5), cut), shape=(len(halved), n))
+        order = np.argsort(-lengths)
+        rank = np.argsort(order)
+        longest = edge_of[np.arange(len(faces)), rank[edge_of].argmin(axis=1)]
+        borders = np.bincount(edge_of.ravel(), minlength=len(edges))
+        # Not much shorter ones than the longest of all: the triangles shall become alike.
+        chosen = (np.bincount(longest, minlength=len(edges)) == borders) & (lengths > lengths.max() / 1.4)
+        order = order[chosen[order]]
+        order = order[np.cumsum(borders[order]) <= max(triangles - len(faces), borders[order[0]])]
+        middle = np.full(len(edges), -1)
+        middle[order] = len(position) + np.arange(len(order))
+        rows = np.flatnonzero(middle[longest] >= 0)
+        side = (edge_of[rows] == longest[rows, None]).argmax(axis=1)
+        a, b, c = (faces[rows, (side + k) % 3] for k in range(3))
+        new = middle[longest[rows]]
+        faces = np.concatenate([faces, np.stack([new, b, c], axis=1)])
+        faces[rows] = np.stack([a, new, c], axis=1)
+        parents = np.concatenate([parents, parents[rows]])
+        ends_of = np.repeat(np.arange(len(order)), 2), edges[order].ravel()
+        half = sparse.csr_array((np.full(2 * len(order), 0.5), ends_of), shape=(len(order), len(position)))
         matrix = sparse.csr_array(sparse.vstack([matrix, half @ matrix]))
-        faces, parents = np.concatenate([faces, new_faces]), np.concatenate([parents, new_parents])
     return faces.astype(np.int32), parents, matrix
 
 
