@@ -17,7 +17,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from facegen.errors import FacegenError, FileError, InputError, NotationError, TableError
+    from facegen.errors import FacegenError, FileError, InputError, JobError, NotationError, TableError
     from facegen.face.face import Controls, Face, face_names, load_face
     from facegen.facs.deformation import Deformation, load_deformation
     from facegen.facs.expression_table import people
@@ -26,7 +26,8 @@ if TYPE_CHECKING:
     from facegen.facs.tables import load_expressions, load_person, load_units
     from facegen.fileio.images import contact_sheet, save_image
     from facegen.geometry.mesh import Mesh
-    from facegen.render import Renderer, render
+    from facegen.jobs.batch import run_batch
+    from facegen.render import Renderer, Wireframe, render, render_passes, save_passes
 
 __version__ = "0.1.0"
 
@@ -37,11 +38,13 @@ __all__ = [
     "FacegenError",
     "FileError",
     "InputError",
+    "JobError",
     "Mesh",
     "NotationError",
     "Renderer",
     "Resolution",
     "TableError",
+    "Wireframe",
     "canonical",
     "contact_sheet",
     "face_names",
@@ -54,13 +57,16 @@ __all__ = [
     "people",
     "presets",
     "render",
+    "render_passes",
     "resolve",
+    "run_batch",
     "save_image",
+    "save_passes",
 ]
 
 # Where each name lives. Read on first use (PEP 562), so that `import facegen` costs nothing.
 _HOMES = {
-    "facegen.errors": ("FacegenError", "FileError", "InputError", "NotationError", "TableError"),
+    "facegen.errors": ("FacegenError", "FileError", "InputError", "JobError", "NotationError", "TableError"),
     "facegen.face.face": ("Controls", "Face", "face_names", "load_face"),
     "facegen.facs.deformation": ("Deformation", "load_deformation"),
     "facegen.facs.expression_table": ("people",),
@@ -69,6 +75,10 @@ _HOMES = {
     "facegen.facs.tables": ("load_expressions", "load_person", "load_units"),
     "facegen.fileio.images": ("contact_sheet", "save_image"),
     "facegen.geometry.mesh": ("Mesh",),
+    "facegen.jobs.batch": ("run_batch",),
+    "facegen.render.overlay": ("Wireframe",),
+    "facegen.render.passes": ("render_passes",),
+    "facegen.render.passfiles": ("save_passes",),
     "facegen.render.render": ("Renderer",),
     "facegen": ("render",),                 # the package itself: calling it draws
 }

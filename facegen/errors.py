@@ -3,10 +3,11 @@
 ::
 
     FacegenError
-    └── InputError (also a ValueError)      something the caller gave is wrong
-        ├── NotationError                   a FACS script; knows the position
-        ├── TableError                      a YAML table or data file; knows file and key path
-        └── FileError                       a file that cannot be read or written
+    ├── InputError (also a ValueError)      something the caller gave is wrong
+    │   ├── NotationError                   a FACS script; knows the position
+    │   ├── TableError                      a YAML table or data file; knows file and key path
+    │   └── FileError                       a file that cannot be read or written
+    └── JobError                            workers that die, a cluster that goes away
 
 A message says which argument is wrong, what was expected, what came, and how to mend it.
 """
@@ -40,6 +41,10 @@ class TableError(InputError):
 
 class FileError(InputError):
     """A file cannot be read or written."""
+
+
+class JobError(FacegenError):
+    """Work could not be finished though the input is right: workers died, or a cluster went away."""
 
 
 def nearest(name: str, valid: Iterable[str]) -> str:

@@ -10,8 +10,8 @@ from typing import Annotated
 import typer
 
 from facegen import __version__
-from facegen.cli import explain, figures, gallery, listing, picture
-from facegen.errors import FacegenError
+from facegen.cli import batch, explain, figures, gallery, listing, picture
+from facegen.errors import FacegenError, InputError
 
 DONE, STOPPED, WRONG = 0, 1, 2
 
@@ -24,6 +24,7 @@ app.command("render")(picture.render)
 app.add_typer(listing.app, name="list")
 app.command("explain")(explain.explain)
 app.command("gallery")(gallery.gallery)
+app.command("batch")(batch.batch)
 app.command("figures")(figures.figures)
 
 
@@ -57,7 +58,7 @@ def run(argv: Sequence[str] | None = None) -> int:
         sys.stdout.flush()
         return code if isinstance(code, int) else DONE
     except FacegenError as error:
-        return _say(str(error), WRONG)
+        return _say(str(error), WRONG if isinstance(error, InputError) else STOPPED)
     except _CommandLineError as error:
         context = getattr(error, "ctx", None)
         hint = f" ({context.command_path} --help explains)" if context else ""

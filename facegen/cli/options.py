@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import re
 import sys
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
@@ -36,33 +35,31 @@ Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="No warnings and no p
 
 def read_view(text: str) -> tuple[float, float]:
     """Return "30,-10" as (yaw, pitch); one number alone is the yaw."""
-    parts = text.split(",")
-    try:
-        angles = [float(part) for part in parts]
-    except ValueError:
-        angles = []
-    if not 1 <= len(angles) <= 2:
-        raise InputError(f"--view: expected YAW,PITCH in degrees such as 30,0, got '{text}'")
-    return angles[0], angles[1] if len(angles) == 2 else 0.0
+    from facegen.render.wishes import parse_view
+
+    return _option(parse_view, text)
 
 
 def read_size(text: str) -> tuple[int, int]:
     """Return "512" or "640x480" as (width, height)."""
-    found = re.fullmatch(r"([0-9]{1,6})(?:[xX×]([0-9]{1,6}))?", text.strip(), re.ASCII)
-    if not found:
-        raise InputError(f"--size: expected pixels such as 512 or 640x480, got '{text}'")
-    return int(found[1]), int(found[2] or found[1])
+    from facegen.render.wishes import parse_size
+
+    return _option(parse_size, text)
 
 
 def read_background(text: str) -> str | tuple[int, ...]:
     """Return "plain", "transparent", or "#aabbcc" and "170,187,204" as (r, g, b)."""
-    if re.fullmatch("#[0-9a-fA-F]{6}", text):
-        return tuple(bytes.fromhex(text[1:]))
-    if re.fullmatch("[0-9]{1,6}(,[0-9]{1,6}){2}", text, re.ASCII):
-        return tuple(int(part) for part in text.split(","))
-    if text not in ("plain", "transparent"):
-        raise InputError(f"--background: expected plain, transparent, #rrggbb or r,g,b, got '{text}'")
-    return text
+    from facegen.render.wishes import parse_background
+
+    return _option(parse_background, text)
+
+
+def _option(parse: Callable[[str], Any], text: str) -> Any:
+    """Return what a text means; an error names the option as it is typed."""
+    try:
+        return parse(text)
+    except InputError as error:
+        raise InputError(f"--{error}") from error
 
 
 def full_name(what: str) -> str:

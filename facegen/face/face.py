@@ -6,7 +6,7 @@ no code. A face is a rig: ``pose(what)`` gives vertices, ``mesh(detail)`` what t
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cache, cached_property
 from pathlib import Path
@@ -18,15 +18,17 @@ from scipy import sparse
 
 from facegen.data import meshes_dir
 from facegen.errors import InputError, nearest
+from facegen.face.attach import attach
 from facegen.face.deformer import Array, Deformer
 from facegen.face.eye import eyeball_radius
 from facegen.face.folds import fold_field
+from facegen.face.landmarks import landmark_weights
 from facegen.face.loader import FaceData, read_face
 from facegen.facs.deformation import Deformation
 from facegen.facs.expressions import Resolution, resolve
 from facegen.geometry.mesh import Mesh, merge
 from facegen.geometry.normals import vertex_normals
-from facegen.geometry.subdivision import loop_once
+from facegen.geometry.subdivision import inherited_sides, loop_once
 
 MAX_DETAIL = 3
 """Finest subdivision level; every level samples the surface of this one."""
@@ -64,6 +66,8 @@ class _Level:
     lid_vertices: tuple[NDArray[np.int64], ...]
     folds: Array                        # (f, n_surface, 3) displacement at amount one
     head_weight: Array                  # (n, 1)
+    points: sparse.csr_array            # feature points on the surface, from the vertices
+    landmarks: sparse.csr_array         # the same for landmarks
 
 
 class Face:
@@ -80,6 +84,40 @@ class Face:
     def feature_points(self) -> dict[str, Array]:
         """Name -> neutral place (3,), mm, of every feature point."""
         return dict(zip(self._data.point_names, self.deformer.points, strict=True))
+
+    def feature_point_places(self, vertices: Array, *, detail: int = 2) -> dict[str, Array]:
+        """Return name -> place (3,), mm, of every feature point on a posed surface.
+
+        ``vertices`` (n, 3) of ``mesh(detail)``, such as :meth:`pose` gives. A feature point is a vertex of the cage;
+        the smooth surface runs a little inside the cage, and this is the place on the surface that belongs to it.
+        """
+        return _placed(self._data.point_names, self._level(detail).points, vertices, detail)
+
+    @property
+    def landmarks(self) -> tuple[str, ...]:
+        """Names of the landmarks; none if no ``landmarks.yaml`` lies beside its ``face.yaml``."""
+        return tuple(self._data.landmarks)
+
+    def landmark_points(self, vertices: Array, *, detail: int = 2) -> dict[str, Array]:
+        """Return name -> place (3,), mm, of every landmark on a posed surface.
+
+        ``vertices`` (n, 3) of ``mesh(detail)``, such as :meth:`pose` gives. ::
+
+            points = face.landmark_points(face.pose("happiness"))
+            points["mouth_corner_L"] - points["mouth_corner_R"]
+        """
+        return _placed(self.landmarks, self._level(detail).landmarks, vertices, detail)
+
+    def cage_sides(self, detail: int = 2) -> NDArray[np.bool_]:
+        """Return which sides (m, 3) of the triangles of ``mesh(detail)`` run along the cage's edges.
+
+        Side k runs from corner k to the next. Parts beside the skin have no cage: none of theirs does.
+        """
+        sides = np.ones(self._data.faces.shape, bool)
+        mesh = self.mesh(detail)
+        for _ in range(detail):
+            sides = inherited_sides(sides)
+        return np.concatenate([sides, np.zeros((len(mesh.faces) - len(sides), 3), bool)])
 
     @property
     def regions(self) -> tuple[tuple[str, str, str], ...]:
@@ -270,7 +308,31 @@ class Face:
         mesh = merge([skin, *(a.mesh for a in d.attachments)])
         normals = vertex_normals(neutral, faces)
         folds = np.array([fold_field(f, neutral, normals) for f in d.folds.values()]).reshape(len(d.folds), n, 3)
-        return _Level(matrix, mesh, tuple(lids), folds, d.head_weight(mesh.vertices))
+        return _Level(matrix, mesh, tuple(lids), folds, d.head_weight(mesh.vertices), self._points_on(mesh),
+                      landmark_weights(d.landmarks, mesh, detail))
+
+    def _points_on(self, mesh: Mesh) -> sparse.csr_array:
+        """Return the weights (k, n) of a mesh's vertices that place the feature points on its surface."""
+        d = self._data
+        weights = sparse.lil_array((len(d.point_names), len(mesh.vertices)))
+        for row, (vertex, part) in enumerate(zip(d.point_vertices, d.point_parts, strict=True)):
+            if vertex >= 0:             # vertices of the cage keep their index at every level
+                weights[row, vertex] = 1.0
+            else:
+                faces = mesh.faces[mesh.face_parts == mesh.parts.index(part or "skin")]
+                near = attach(self.deformer.points[[row]], mesh.vertices, faces,
+                              sparse.csr_array(sparse.identity(len(mesh.vertices), format="csr")))
+                weights[row, near.indices] = near.data
+        return sparse.csr_array(weights)
+
+
+def _placed(names: Iterable[str], weights: sparse.csr_array, vertices: Array, detail: int) -> dict[str, Array]:
+    """Return name -> place (3,) for the rows of ``weights`` (k, n)."""
+    vertices = np.asarray(vertices, dtype=np.float64)
+    if vertices.shape != (weights.shape[1], 3):
+        raise InputError(f"vertices: expected shape {(weights.shape[1], 3)} at detail {detail}, "
+                         f"got {vertices.shape}")
+    return dict(zip(names, weights @ vertices, strict=True))
 
 
 @cache

@@ -14,6 +14,7 @@ from scipy import sparse
 from facegen.face.attach import Attachment, attach
 from facegen.face.deformer import Array, Deformer, Jaw, Lids, Region, region_weights
 from facegen.face.folds import Fold
+from facegen.face.landmarks import Landmark, read_landmarks
 from facegen.facs.validate import Entry
 from facegen.facs.yamlfile import read_data
 from facegen.fileio.obj import load_obj
@@ -22,7 +23,8 @@ from facegen.geometry.subdivision import Subdivision, loop_levels
 
 REQUIRED = ("name", "source", "cage", "centre_O", "measures", "scales", "points", "regions", "jaw", "eyes",
             "lids", "head")
-OPTIONAL = ("sheets", "followers", "creases", "corners", "parts", "folds", "lid_follow", "head_half_height")
+OPTIONAL = ("sheets", "followers", "creases", "corners", "parts", "folds", "lid_follow", "head_half_height",
+            "landmarks")
 CARRIERS = ("skull", "skin", "jaw", "eye", "mouth")
 ROLES = ("input", "jaw", "fixed")
 SIDES = ("L", "R")
@@ -43,6 +45,8 @@ class FaceData:
     corners: NDArray[np.int32]
     point_names: tuple[str, ...]
     point_index: Mapping[str, int]
+    point_vertices: NDArray[np.int32]       # (k,) the cage's vertex that each point is, -1 for one set apart
+    point_parts: tuple[str | None, ...]     # the part that a point belongs to, None for the skin
     point_scale: Array
     scales: Mapping[str, Array]
     regions: tuple[Region, ...]
@@ -56,6 +60,7 @@ class FaceData:
     attachments: tuple[Attachment, ...]
     folds: Mapping[str, Fold]
     takes_input: NDArray[np.bool_]
+    landmarks: Mapping[str, Landmark]
 
 
 def read_face(path: Path) -> FaceData:
@@ -65,7 +70,7 @@ def read_face(path: Path) -> FaceData:
     n = len(cage.vertices)
 
     def index(entry: Entry) -> int:
-        return _whole(entry, n, f"a vertex of {top['cage'].text()}")
+        return entry.index(n, f"a vertex of {top['cage'].text()}")
 
     def indices(entry: Entry) -> NDArray[np.int32]:
         return np.array([index(e) for e in entry.each()], np.int32)
@@ -84,14 +89,15 @@ def read_face(path: Path) -> FaceData:
     jaw = Jaw(place(jaw_fields["hinge"]), place(jaw_fields["glide"]), rule)
     names: list[str] = []
     takes_input: list[bool] = []
-    places, point_scale, jaw_share, aliases, with_parts = [], [], [], {}, {}
+    places, point_scale, jaw_share, point_vertices, aliases, with_parts = [], [], [], [], {}, {}
     for name, entry in top["points"].items():
         fields = entry.fields(required=("role", "scale"), optional=("vertex", "at", "jaw", "paper", "part"))
         if ("vertex" in fields) == ("at" in fields):
             raise entry.fail("a feature point needs either vertex or at")
         role = fields["role"].choice(ROLES, "role")
         takes_input.append(role == "input" or (role == "jaw" and rule == "vertices"))
-        places.append(cage.vertices[index(fields["vertex"])] if "vertex" in fields else place(fields["at"]))
+        point_vertices.append(index(fields["vertex"]) if "vertex" in fields else -1)
+        places.append(place(fields["at"]) if "at" in fields else cage.vertices[point_vertices[-1]])
         point_scale.append(scales[fields["scale"].choice(scales, "scale")])
         jaw_share.append(fields["jaw"].number(0, 1) if "jaw" in fields else 0.0)
         for key, rows in (("paper", aliases), ("part", with_parts)):
@@ -139,7 +145,7 @@ def read_face(path: Path) -> FaceData:
                   for e in _some(fields["movers"], None, "one mover or more")]
         lids.append(Lids(eyes[side], columns,
                          np.array([index(m[0]) for m in movers]),
-                         np.array([_whole(m[1], len(columns), "a column of the lid") for m in movers]),
+                         np.array([m[1].index(len(columns), "a column of the lid") for m in movers]),
                          np.array([m[2].choice(("upper", "lower"), "lid") == "lower" for m in movers]),
                          np.array([m[3].number(-1, 1) for m in movers])))
         rims.append(indices(fields["rims"]))
@@ -177,6 +183,11 @@ def read_face(path: Path) -> FaceData:
     for part, row in with_parts.items():
         if part not in parts:
             Entry(part, str(path), f"points.{names[row]}.part").choice(parts, "part")
+    part_of = {row: part for part, row in with_parts.items()}
+    marks = path.parent / (top["landmarks"].text() if "landmarks" in top else "landmarks.yaml")
+    if "landmarks" in top and not marks.is_file():
+        raise top["landmarks"].wrong("the path of a file that exists")
+    landmarks = read_landmarks(marks, Path(top["cage"].text()).name, n, cage.faces, parts) if marks.exists() else {}
     folds = {}
     for name, entry in top["folds"].items() if "folds" in top else ():
         fields = entry.fields(required=("along", "width", "depth", "ridge", "toward"))
@@ -193,24 +204,17 @@ def read_face(path: Path) -> FaceData:
             follow[i] = [e.number() for e in _some(entry, 2, expected)]
     return FaceData(
         top["name"].text(), top["source"].text(), deformer, cage.faces, cage.materials, cage.face_materials,
-        creases, corners, tuple(names), {**aliases, **at}, np.array(point_scale), scales, tuple(regions),
+        creases, corners, tuple(names), {**aliases, **at}, np.array(point_vertices),
+        tuple(part_of.get(row) for row in range(len(names))), np.array(point_scale), scales, tuple(regions),
         np.array(list(eyes.values())), tuple(rims), tuple(lid_skin), follow,
         place(head["pivot"]), head_weight,
         top["head_half_height"].number(1e-6) if "head_half_height" in top
         else float(np.ptp(cage.vertices[:, 1]) / 2),
-        attachments, folds, np.array(takes_input))
+        attachments, folds, np.array(takes_input), landmarks)
 
 
 def _integer(key: str) -> object:
     return int(key) if key.isdecimal() and len(key) < 10 else key
-
-
-def _whole(entry: Entry, count: int, what: str) -> int:
-    """Return a whole number in ``0..count - 1``."""
-    value = entry.number()
-    if not 0 <= value < count or value != int(value):
-        raise entry.wrong(f"{what}, 0..{count - 1}")
-    return int(value)
 
 
 def _some(entry: Entry, count: int | None, expected: str) -> list[Entry]:

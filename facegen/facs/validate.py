@@ -94,6 +94,13 @@ class Entry:
             raise self.wrong(f"a number in {low:g}..{high:g}")
         return result
 
+    def index(self, count: int, what: str) -> int:
+        """Return a whole number in ``0..count - 1``; ``what`` it counts."""
+        value = self.number()
+        if not 0 <= value < count or value != int(value):
+            raise self.wrong(f"{what}, 0..{count - 1}")
+        return int(value)
+
     def vector(self, limit: float) -> tuple[float, float, float]:
         """Return three numbers in ``-limit..limit``."""
         value = self.value.tolist() if hasattr(self.value, "tolist") else self.value

@@ -46,6 +46,25 @@ def save_image(pixels: ArrayLike, path: str | os.PathLike[str]) -> Path:
     return path
 
 
+def save_mask(labels: ArrayLike, path: str | os.PathLike[str]) -> Path:
+    """Write labels (h, w) uint8 as a grey PNG, value for value, and return the path; it appears whole or not at all.
+
+    Raises InputError for the labels, FileError for the path.
+    """
+    labels = np.asarray(labels)
+    if labels.dtype != np.uint8 or labels.ndim != 2 or 0 in labels.shape:
+        raise InputError(f"labels: expected shape (h, w) and type uint8, got {labels.shape} {labels.dtype}")
+    path = check_image_path(path)
+    if path.suffix.lower() != ".png":
+        raise FileError(f"{path}: a mask must keep its values: expected a name that ends in .png")
+
+    from PIL import Image
+
+    with whole_file(path, "the mask ") as draft, open(draft, "wb") as file:
+        Image.fromarray(labels).save(file, "PNG", compress_level=6)
+    return path
+
+
 def check_image_path(path: str | os.PathLike[str]) -> Path:
     """Return a path that a picture can be written to, or raise FileError: ask before long work."""
     path = Path(path)

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from facegen.errors import FileError
@@ -16,7 +16,8 @@ def whole_file(path: Path, what: str = "") -> Iterator[Path]:
 
     An existing file is replaced whole or stays as it was. ``what`` goes before "cannot be written".
     """
-    draft = path.with_name(f".{path.name}.{os.getpid()}.part")
+    # A name of its own: threads, and machines that share the folder, may write the same file at once.
+    draft = path.with_name(f".{path.name}.{os.urandom(4).hex()}.part")
     try:
         try:
             yield draft
@@ -25,6 +26,18 @@ def whole_file(path: Path, what: str = "") -> Iterator[Path]:
             draft.unlink(missing_ok=True)
     except OSError as error:
         raise FileError(f"{path}: {what}cannot be written: {error.strerror or error}") from error
+
+
+def remove_drafts(paths: Iterable[Path]) -> None:
+    """Remove what a killed process left beside ``paths``: drafts that were never renamed."""
+    folders: dict[Path, set[str]] = {}
+    for path in paths:
+        folders.setdefault(path.parent, set()).add(path.name)
+    for folder, names in folders.items():
+        for draft in folder.glob(".*.part"):
+            if draft.name[1:].rsplit(".", 2)[0] in names:
+                with suppress(OSError):
+                    draft.unlink()
 
 
 def save_text(text: str, path: str | os.PathLike[str]) -> Path:

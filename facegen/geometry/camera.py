@@ -45,6 +45,25 @@ class Camera:
         """Depth in front of which nothing is drawn."""
         return NEAR * self.distance
 
+    @property
+    def extrinsics(self) -> NDArray[np.float64]:
+        """World to camera, (3, 4): ``[R | t] @ (x, y, z, 1)`` is a place in the axes that computer vision is used to.
+
+        These are: x to the picture's right, y DOWN, z forward, away from the viewer; the camera is the origin. Mesh
+        units.
+        """
+        axes = self.rotation * np.array([[1.0], [-1.0], [-1.0]])
+        return np.column_stack([axes, np.array([0.0, 0.0, self.distance]) - axes @ self.target])
+
+    @property
+    def intrinsics(self) -> NDArray[np.float64]:
+        """Camera to pixels, (3, 3): ``K @ (X / Z, Y / Z, 1)`` for a place (X, Y, Z) in the axes of ``extrinsics``.
+
+        For an orthographic camera ``K @ (X, Y, 1)``. The centre of the first pixel is (0.5, 0.5).
+        """
+        focal = self.scale * (1.0 if self.orthographic else self.distance)
+        return np.array([[focal, 0.0, self.offset[0]], [0.0, focal, self.offset[1]], [0.0, 0.0, 1.0]])
+
     def project(self, vertices: ArrayLike) -> NDArray[np.float64]:
         """Return (..., n, 3): x and y in pixels, and depth in front of the camera in the mesh's units.
 

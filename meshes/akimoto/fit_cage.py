@@ -551,7 +551,8 @@ def write(names, vertices, faces, materials, creases, corners) -> None:
              "# Their figure 3 is not in the text: the layout is our reconstruction from what the text says.",
              "# Eyes, lids and head, which the paper only sketches, are those of `akimoto`. Written by fit_cage.py."]
     write_yaml(folder / "face.yaml", about, {
-        **data, "name": "akimoto-1986", "cage": "../akimoto/cage.obj", "points": paper,
+        **data, "name": "akimoto-1986", "cage": "../akimoto/cage.obj",
+        "landmarks": "../akimoto/landmarks.yaml", "points": paper,
         "regions": design.paper_regions(), "jaw": {"rule": "points", "hinge": [0.0, *vertices[at["ear_root_7_L"], 1:].tolist()], "glide": [0, 0, 0]},
         "parts": parts, "folds": {}})
     print(len(points), "feature points", len(regions), "regions")

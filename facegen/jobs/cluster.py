@@ -1,0 +1,82 @@
+"""A cluster of machines through dask.distributed. The only file that imports it."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from concurrent.futures import Future
+from typing import Any
+
+from facegen.errors import InputError
+
+WAIT = 5.0
+"""Seconds to wait for a scheduler, and for its first worker."""
+
+_RECOUNT = 5.0      # seconds after which workers are counted again: they may join and leave while the work runs
+
+
+def connect(address: str, *, wait: float = WAIT) -> Cluster:
+    """Return the workers of the dask scheduler at an address such as ``tcp://10.0.0.7:8786``.
+
+    Raises InputError if distributed is not installed, nothing answers there within ``wait`` seconds, or no worker is
+    there.
+    """
+    try:
+        from distributed import Client
+    except ImportError as error:
+        raise InputError("scheduler: a cluster needs dask.distributed, which is not installed: "
+                         "pip install \"facegen[cluster]\"") from error
+    try:
+        client = Client(address, timeout=wait, set_as_default=False)
+    except (OSError, TimeoutError) as error:
+        raise InputError(f"scheduler: nothing answers at {address} (waited {wait:g} s); `dask scheduler` starts one "
+                         "and prints its address") from error
+    except (ValueError, TypeError) as error:
+        raise InputError(f"scheduler: expected an address such as tcp://10.0.0.7:8786, got {address!r}: {error}"
+                         ) from error
+    try:
+        client.wait_for_workers(1, timeout=wait)
+    except TimeoutError as error:
+        client.close()
+        raise InputError(f"scheduler: {address} has no workers (waited {wait:g} s); `dask worker {address}` starts one"
+                         ) from error
+    return Cluster(client)
+
+
+class Cluster:
+    """The workers of a dask cluster, as a crew."""
+
+    breaks = False          # the scheduler itself hands out again what a dead worker had in hand ...
+    renewable = True
+    deaths_a_loss = 2       # ... and reports a loss when that has happened several times
+
+    def __init__(self, client: Any) -> None:
+        from distributed import KilledWorker
+
+        self.losses = (KilledWorker,)
+        self._client = client
+        self._executor = client.get_executor(pure=False)
+        self._slots, self._counted = 0, float("-inf")
+
+    @property
+    def slots(self) -> int:
+        """Tasks that all present workers can do at once."""
+        if time.monotonic() - self._counted > _RECOUNT:
+            self._slots = max(1, sum(self._client.nthreads().values()))
+            self._counted = time.monotonic()
+        return self._slots
+
+    def submit(self, work: Callable[..., Any], *arguments: Any) -> Future:
+        """Hand out one chunk."""
+        return self._executor.submit(work, *arguments)
+
+    def renew(self) -> None:
+        """Do nothing: the cluster looks after its workers."""
+
+    def stop(self) -> None:
+        """Take back what no worker has begun."""
+        self._executor.shutdown(wait=False)
+
+    def close(self) -> None:
+        """Let go of the cluster, which stays as it was."""
+        self._client.close()

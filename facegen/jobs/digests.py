@@ -1,0 +1,44 @@
+"""Digests of the data that decide what a picture shows, so that a data set can be made again, or seen to be stale."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from facegen.data import meshes_dir, tables_dir
+from facegen.facs.yamlfile import read_data
+
+TABLES = ("action_units.yaml", "deformations.yaml", "expressions.yaml", "lights.yaml")
+
+
+def digest_of(data: Any) -> str:
+    """Return the SHA-256 of plain data."""
+    text = json.dumps(data, sort_keys=True, ensure_ascii=True, separators=(",", ":"))
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+@cache
+def table_digests() -> dict[str, str]:
+    """Return file name -> SHA-256 of the tables."""
+    return {name: _of_file(tables_dir() / name) for name in TABLES}
+
+
+@cache
+def face_digest(face: str) -> str:
+    """Return the SHA-256 of a face: its ``face.yaml`` and all files that it names. Read once."""
+    path = meshes_dir() / face / "face.yaml"
+    if not path.is_file():
+        path = Path(face)
+        path = path / "face.yaml" if path.is_dir() else path
+    data = read_data(path)
+    named = {data["cage"], data.get("landmarks", "landmarks.yaml"), *(part["file"] for part in data.get("parts", ()))}
+    files = [path, *(path.parent / name for name in sorted(named))]
+    return digest_of([_of_file(one) for one in files if one.is_file()])
+
+
+def _of_file(path: Path) -> str:
+    # Line ends are a matter of the checkout, not of the data.
+    return hashlib.sha256(path.read_bytes().replace(b"\r\n", b"\n")).hexdigest()
