@@ -14,6 +14,7 @@ from facegen.cli import batch, explain, figures, gallery, listing, picture
 from facegen.errors import FacegenError, InputError
 
 DONE, STOPPED, WRONG = 0, 1, 2
+_INTERRUPTED = 130      # what typer makes of Ctrl-C
 
 # The errors of a command line (an unknown option, a missing argument): typer exports only their child.
 _CommandLineError = typer.BadParameter.__mro__[2]
@@ -56,6 +57,8 @@ def run(argv: Sequence[str] | None = None) -> int:
     try:
         code = app(args=None if argv is None else list(argv), prog_name="facegen", standalone_mode=False)
         sys.stdout.flush()
+        if code == _INTERRUPTED:
+            return _say("stopped", STOPPED)
         return code if isinstance(code, int) else DONE
     except FacegenError as error:
         return _say(str(error), WRONG if isinstance(error, InputError) else STOPPED)

@@ -17,14 +17,14 @@ from facegen.errors import InputError, JobError
 from facegen.jobs.batch import run_batch
 
 if os.environ.get("FACEGEN_CI"):
-    import distributed      # here a missing package is a failure, not a reason to skip
+    import distributed  # here a missing package is a failure, not a reason to skip
 else:
     distributed = pytest.importorskip("distributed")
 
-from tasks import begun, some, texts  # noqa: E402
+from tasks import begun, some, texts
 
-from facegen.jobs.cluster import connect  # noqa: E402
-from facegen.jobs.runner import Report, run  # noqa: E402
+from facegen.jobs.cluster import connect
+from facegen.jobs.runner import Report, run
 
 # distributed leaves sockets and loops to the garbage collector, and so do its shut-down clients.
 pytestmark = [pytest.mark.filterwarnings("ignore::ResourceWarning"),
