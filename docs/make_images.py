@@ -1,15 +1,19 @@
 """Draw every picture of the documentation anew: python docs/make_images.py (about a minute)."""
 
 import tempfile
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
-from PIL import Image
+from numpy.typing import NDArray
+from PIL import Image, ImageDraw
 
-from facegen import save_image
+from facegen import Wireframe, load_face, render, render_passes, save_image, save_passes
 from facegen.cli import main
 
 IMAGES = Path(__file__).parent / "images"
+FACE = load_face()
+SIZE = 320
 
 
 def run(*argv: object) -> None:
@@ -18,10 +22,40 @@ def run(*argv: object) -> None:
         raise SystemExit(1)
 
 
+def strip(pictures: Sequence[NDArray[np.uint8]]) -> NDArray[np.uint8]:
+    """Return pictures side by side."""
+    return np.concatenate([picture[..., :3] for picture in pictures], axis=1)
+
+
+def pass_strip() -> NDArray[np.uint8]:
+    """Return depth, normals, parts and landmarks of one pose side by side, as their files show them."""
+    options = {"size": SIZE, "view": (25, 0)}
+    found = render_passes(FACE, "happiness", passes=("depth", "normal", "part", "landmarks"), **options)
+    with tempfile.TemporaryDirectory() as folder:
+        paths = save_passes(found, f"{folder}/")
+        depth, normal, part = (Image.open(paths[name]) for name in ("depth", "normal", "part"))
+        grey = np.asarray(depth)
+        # Light is near; eight bits are enough to look at.
+        grey = np.where(grey > 0, 255 - grey // 280, 0).astype(np.uint8)
+        shown = [np.repeat(grey[..., None], 3, axis=2), np.asarray(normal), np.asarray(part.convert("RGB"))]
+    picture = Image.fromarray(render(FACE, "happiness", **options)[..., :3])
+    draw, points = ImageDraw.Draw(picture), found["landmarks"]
+    for (x, y), visible in zip(points.xy, points.visible, strict=True):
+        draw.ellipse((x - 2.5, y - 2.5, x + 2.5, y + 2.5), fill=(20, 150, 70) if visible else (200, 40, 40))
+    return strip([*shown, np.asarray(picture)])
+
+
 if __name__ == "__main__":
     IMAGES.mkdir(exist_ok=True)
     run("gallery", "-o", IMAGES)
     run("render", "happiness", "-o", IMAGES / "happiness.png", "--size", 640)
+    save_image(strip([
+        render(FACE, "surprise", size=SIZE, shading="flat", wireframe=True),
+        render(FACE, "surprise", size=SIZE, detail=2, view=(30, 0), wireframe=Wireframe(lines="cage")),
+    ]), IMAGES / "wireframe.webp")
+    save_image(strip([render(FACE, "anger", size=SIZE, view=(35, 0), shadows=shadows) for shadows in (False, True)]),
+               IMAGES / "shadows.webp")
+    save_image(pass_strip(), IMAGES / "passes.webp")
     with tempfile.TemporaryDirectory() as folder:
         run("figures", "-o", folder, "--size", 256)
         for face in ("akimoto-1986", "akimoto"):

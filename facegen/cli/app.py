@@ -10,7 +10,7 @@ from typing import Annotated
 import typer
 
 from facegen import __version__
-from facegen.cli import batch, explain, figures, gallery, listing, picture
+from facegen.cli import batch, explain, figures, film, gallery, listing, picture
 from facegen.errors import FacegenError, InputError
 
 DONE, STOPPED, WRONG = 0, 1, 2
@@ -27,6 +27,9 @@ app.command("explain")(explain.explain)
 app.command("gallery")(gallery.gallery)
 app.command("batch")(batch.batch)
 app.command("figures")(figures.figures)
+app.command("animate")(film.animate)
+app.command("morph")(film.morph)
+app.command("turntable")(film.turntable)
 
 
 def _version(asked: bool) -> None:

@@ -68,9 +68,14 @@ def read_what(what: str, *, person: str | None, intensity: float, quiet: bool) -
 
     resolution = resolve(full_name(what), person=person, intensity=intensity)
     if not quiet:
-        for warning in resolution.warnings:
-            print(f"facegen: warning: {warning}", file=sys.stderr)
+        warn(resolution.warnings)
     return resolution
+
+
+def warn(warnings: Iterable[str]) -> None:
+    """Print warnings on stderr."""
+    for warning in warnings:
+        print(f"facegen: warning: {warning}", file=sys.stderr)
 
 
 def print_json(data: Any) -> None:

@@ -35,7 +35,8 @@ class Resolution:
 
     name: for a caption - the expression's name, the canonical script, or the file's stem. expression: the
     table's entry, if a name led here. units: code -> weight, intensity applied, combinations not yet; empty
-    for raw data. source: where the recipe or data come from, as far as known.
+    for raw data. source: where the recipe or data come from, as far as known. more: further movements, in other units
+    of length than ``deformation``, which only a face can add to it.
     """
 
     what: object
@@ -46,6 +47,7 @@ class Resolution:
     deformation: Deformation
     warnings: tuple[str, ...] = ()
     source: str | None = None
+    more: tuple[Deformation, ...] = ()
 
 
 def presets() -> tuple[str, ...]:

@@ -41,6 +41,16 @@ def identity(n_vertices: int, faces: NDArray[np.int32], creases: NDArray[np.int3
                        np.arange(len(faces), dtype=np.int32), np.asarray(creases, np.int32).reshape(-1, 2))
 
 
+def inherited_sides(sides: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Return which sides (4 m, 3) of the triangles of `loop_once` lie on marked sides (m, 3) of the ones before.
+
+    Side k of a triangle runs from its corner k to the next.
+    """
+    ab, bc, ca = np.asarray(sides, bool).T
+    no = np.zeros_like(ab)
+    return np.stack([ab, no, ca, bc, no, ab, ca, no, bc, no, no, no], axis=1).reshape(-1, 3)
+
+
 def loop_levels(n_vertices: int, faces, creases, levels: int, *, corners=()) -> tuple[Subdivision, ...]:
     """Return the subdivisions from level 0 to ``levels``, each from the coarse mesh directly.
 

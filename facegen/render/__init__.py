@@ -4,10 +4,12 @@ import sys
 from types import ModuleType
 
 from facegen.render.backends import RENDERERS
+from facegen.render.overlay import Wireframe
 from facegen.render.passes import PASSES, render_passes
+from facegen.render.passfiles import save_passes
 from facegen.render.render import Renderer, render
 
-__all__ = ["PASSES", "RENDERERS", "Renderer", "render", "render_passes"]
+__all__ = ["PASSES", "RENDERERS", "Renderer", "Wireframe", "render", "render_passes", "save_passes"]
 
 
 class _Callable(ModuleType):

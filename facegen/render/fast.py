@@ -26,6 +26,7 @@ from facegen.render.occlusion import (
 from facegen.render.request import Look
 from facegen.render.scene import Scene
 from facegen.render.shading import CAVITY, DARKEST, light_directions, material_rows, srgb_table, to_srgb, unit
+from facegen.render.shadow import with_shadows
 from facegen.render.soft import background_rows
 
 # Steps of the table for a power of openness; linear between them.
@@ -41,7 +42,6 @@ class FastBackend:
         self.neutral, self.camera, self.scene, self.look = neutral, camera, scene, look
         n, m, lights = len(neutral.vertices), len(neutral.faces), len(scene.lights)
         self._faces = np.ascontiguousarray(neutral.faces)
-        self._adjacency, self._ring = _rings(self._faces, n)
         self._cam = np.array([*camera.rotation.ravel(), *camera.target, camera.distance, camera.scale, *camera.offset,
                               camera.orthographic, camera.near], np.float64)
         focal = camera.scale * camera.distance
@@ -66,11 +66,14 @@ class FastBackend:
         self._threads = 1 if small else min(look.threads or _cores(), bands)
         self._proj, self._snapped, self._depth = np.empty((n, 3)), np.empty((n, 2), np.int32), np.empty(n)
         self._kind, self._first, self._last = np.empty(m, np.int16), np.empty(m, np.int32), np.empty(m, np.int32)
-        self._starts = np.empty(bands + 1, np.int64)
-        self._scratch = [_Scratch(n, m, lights) for _ in range(self._threads)]
+        self._starts, self._columns = np.empty(bands + 1, np.int64), np.empty((bands, 2), np.int64)
+        self._normals, self._attributes = np.zeros((n, 3), np.float32), np.empty((n, 4 + lights), np.float32)
+        self._work = np.empty(6 * kernels.CHUNK, np.float32)
+        # What each thread works out about the triangles that it sees: planes, and which are done.
+        self._scratch = [(np.empty((m, 16), np.float32), np.empty(m, np.uint8)) for _ in range(self._threads)]
         self._light = np.ones((n, 1 + lights), np.float32)
         if look.occlusion == "neutral":
-            self._light = self._baked(neutral.vertices)[0]
+            self._light = self._baked(neutral.vertices)
 
     def draw(self, vertices: NDArray[np.float64]) -> NDArray[np.uint8]:
         """Return the picture (h, w, 4) of checked vertices (n, 3)."""
@@ -79,39 +82,40 @@ class FastBackend:
         kernels.project(vertices, self._cam, self._proj, self._snapped, self._depth)
         items = kernels.bin_triangles(self._faces, self._snapped, self._depth, width, height,
                                       self.neutral.face_materials, self._inside, self._kind, self._first, self._last,
-                                      self._starts)
-        light, normals = self._light, None
-        if self.look.occlusion == "posed":
-            light, normals = self._baked(vertices)
-            normals = normals @ self.camera.rotation.T
+                                      self._starts, self._columns)
+        light = self._baked(vertices) if self.look.occlusion == "posed" else self._light
+        if not (self.look.flat or self.look.occlusion == "posed"):
+            kernels.all_normals(vertices, self._faces, self._work, self._normals)
+        if self.look.shadows:
+            light = with_shadows(light, self.neutral.with_vertices(vertices), self.camera, self.scene)
+        kernels.fill_attributes(self._normals, light, self._cam, self._attributes)
         picture = self._blank.copy()
 
         def bands(thread: int) -> None:
-            own = self._scratch[thread]
-            own.begin(light, normals)
+            planes, ready = self._scratch[thread]
+            ready[:] = 0
             kernels.draw_bands(
-                thread, len(self._starts) - 1, self._threads, items, self._starts, vertices, self._faces, self._proj,
-                self._snapped, self._depth, self._kind, self._inside, self._cam, self.look.flat, normals is not None,
-                self._adjacency, self._ring, own.attributes, own.vertex_ready, own.planes, own.ready, self._material,
-                self._lamps, self._sky, self._view, _powers(), srgb_table(), self._behind,
-                self._transparent, picture.view(np.uint32)[..., 0])
+                thread, len(self._starts) - 1, self._threads, items, self._starts, self._columns, vertices,
+                self._faces, self._proj, self._snapped, self._depth, self._kind, self._inside, self._cam,
+                self.look.flat, self._attributes, planes, ready, self._material, self._lamps, self._sky, self._view,
+                _powers(), srgb_table(), self._behind, self._transparent, picture.view(np.uint32)[..., 0])
 
         self._share_out(bands)
         return picture
 
-    def _baked(self, vertices: NDArray[np.float64]) -> tuple[NDArray[np.float32], NDArray[np.float64]]:
-        """Return each vertex's light shares (n, 1 + lights) and normal (n, 3) in world axes."""
-        normals = np.empty((len(vertices), 3))
-        kernels.all_normals(vertices, self._adjacency, self._ring, normals)
-        local, facing = in_cells(vertices), normals.astype(np.float32)
+    def _baked(self, vertices: NDArray[np.float64]) -> NDArray[np.float32]:
+        """Return each vertex's shares of light (n, 1 + lights); its normal is worked out on the way."""
+        normals = self._normals
+        kernels.all_normals(vertices, self._faces, self._work, normals)
+        local = in_cells(vertices)
         points = bake_kernels.surface_points(local, self._faces, _sequence())
         seen = np.empty((len(vertices), DIRECTIONS), np.float32)
-        self._share_out(lambda thread: bake_kernels.visible(points, local, facing, _frames(), thread, self._threads,
+        self._share_out(lambda thread: bake_kernels.visible(points, local, normals, _frames(), thread, self._threads,
                                                             seen))
         light = np.empty((len(vertices), 1 + len(self._lamps)), np.float32)
-        bake_kernels.shares(seen, facing, self._faces, np.ascontiguousarray(directions().T),
+        bake_kernels.shares(seen, normals, self._faces, np.ascontiguousarray(directions().T),
                             np.ascontiguousarray(self._lobes.T), self._faint, light)
-        return light, normals
+        return light
 
     def _share_out(self, work: Callable[[int], None]) -> None:
         """Have each thread do its share; the kernels let go of the interpreter's lock."""
@@ -119,32 +123,6 @@ class FastBackend:
             work(0)
         else:
             list(_pool(self._threads).map(work, range(self._threads)))
-
-
-class _Scratch:
-    """What one thread works out about vertices and triangles while it draws a picture."""
-
-    def __init__(self, n: int, m: int, lights: int) -> None:
-        self.attributes = np.zeros((n, 4 + lights), np.float32)          # normal in camera axes, light shares
-        self.vertex_ready, self.ready = np.empty(n, np.uint8), np.empty(m, np.uint8)
-        self.planes = np.empty((m, 14), np.float32)
-
-    def begin(self, light: NDArray[np.float32], normals: NDArray | None) -> None:
-        self.attributes[:, 3:] = light
-        if normals is not None:
-            self.attributes[:, :3] = normals
-        self.vertex_ready[:] = 0
-        self.ready[:] = 0
-
-
-def _rings(faces: NDArray[np.int32], count: int) -> tuple[NDArray[np.int64], NDArray[np.int32]]:
-    """Return for each vertex where its entries start, and (3m, 2) the next and the previous corner of its triangles."""
-    corner = faces.ravel()
-    order = np.argsort(corner, kind="stable")
-    ring = np.stack([np.roll(faces, -1, axis=1).ravel(), np.roll(faces, 1, axis=1).ravel()], axis=1)[order]
-    starts = np.zeros(count + 1, np.int64)
-    np.cumsum(np.bincount(corner, minlength=count), out=starts[1:])
-    return starts, np.ascontiguousarray(ring, np.int32)
 
 
 @cache

@@ -38,6 +38,7 @@ from facegen.render.occlusion import light_shares, visibility
 from facegen.render.request import Look
 from facegen.render.scene import Scene
 from facegen.render.shading import light_directions, material_rows, to_srgb
+from facegen.render.shadow import with_shadows
 from facegen.render.soft import background_rows
 
 SAMPLES = 4
@@ -309,10 +310,11 @@ class GlBackend:
         # Position, normal, light shares, material and what the last attribute has over, as the card reads them.
         self._data = np.zeros((len(self._corners), 6 + sum(size for _, size in slots)), np.float32)
         self._own_light = self._data[:, 6:6 + shares]
-        self._own_light[:] = 1.0
+        self._still_light = np.ones((len(neutral.vertices), shares), np.float32)
         self._data[:, 6 + shares] = material
         if look.occlusion == "neutral":
-            self._own_light[:] = self._light(neutral, vertex_normals(neutral.vertices, neutral.faces))[self._corners]
+            self._still_light = self._light(neutral, vertex_normals(neutral.vertices, neutral.faces))
+        self._own_light[:] = self._still_light[self._corners]
         self._behind = background_rows(look.background, scene, camera.height)
         materials = material_rows(neutral, scene)
         shaders = (vertex_shader([size for _, size in slots], shares, materials),
@@ -365,8 +367,12 @@ class GlBackend:
             data[:, 3:6] = np.repeat(face_normals(vertices, self.neutral.faces) @ camera.rotation.T, 3, axis=0)
         else:
             data[:, 3:6] = (smooth @ camera.rotation.T)[corners]
-        if posed:
-            self._own_light[:] = self._light(self.neutral.with_vertices(vertices), smooth)[corners]
+        if posed or self.look.shadows:
+            mesh = self.neutral.with_vertices(vertices)
+            light = self._light(mesh, smooth) if posed else self._still_light
+            if self.look.shadows:
+                light = with_shadows(light, mesh, camera, self.scene)
+            self._own_light[:] = light[corners]
 
     def _light(self, mesh: Mesh, normals: NDArray) -> NDArray[np.float32]:
         """Return the light shares (n, 1 + lights) of a mesh's vertices."""

@@ -28,16 +28,19 @@ BAND_ROWS = 16
 CHUNK = 256
 DEPTHS = 2.0**31 - 2
 # Indices are unsigned: a signed one may count from the end, and the test for that stops vectorisation.
-_LANES, _LANES2 = np.uint64(16), np.uint64(32)
+_LANES = np.uint64(16)
 _ROW_BLOCK = 32                           # a block in the buffer: 16 depths, then 16 triangles
 _BLOCK = np.uint64(_ROW_BLOCK)
 _STEP = np.int64(DEPTH_STEP * DEPTHS)
 _LANE_X = np.array([256 * (lane >> 2) + PATTERNS[4][lane & 3] for lane in range(16)], np.int32)
 _LANE_Y = np.array([32 + 64 * (lane & 3) for lane in range(16)], np.int32)
-# A point to be shaded is its row in the band, its column and its place in the pixel: a sample's or the centre.
-_ROW_SHIFT, _ROW_MASK, _CENTRE = 16, 2**16 - 1, 4
-_SPOT_X = np.array([*(x / 256 for x in PATTERNS[4]), 0.5], np.float32)
-_SPOT_Y = np.array([0.125, 0.375, 0.625, 0.875, 0.5], np.float32)
+# A point to be shaded is its row in the band, its column, and the mask of the samples it stands for: it lies in
+# their middle, and their number is its share of the pixel.
+_ROW_SHIFT, _ROW_MASK = 16, 2**16 - 1
+_MASKS = [[s for s in range(4) if mask >> s & 1] or [0] for mask in range(16)]
+_SPOT_X = np.array([np.mean([PATTERNS[4][s] / 256 for s in mask]) for mask in _MASKS], np.float32)
+_SPOT_Y = np.array([np.mean([(s + 0.5) / 4 for s in mask]) for mask in _MASKS], np.float32)
+_SHARE = np.array([len(mask) / 4 for mask in _MASKS], np.float32)
 # Beyond this many sub-pixels (96 pixels) an edge function may leave 32 bits.
 _SMALL = 96 * 256
 _FARTHEST = 2.0**14
@@ -51,7 +54,8 @@ WORK_ROWS = 17
 (_NX, _NY, _NZ, _VX, _VY, _VZ, _NV, _FREE, _R, _G, _B, _SR, _SG, _SB, _X, _Y, _REACH) = (
     np.uint64(CHUNK * row) for row in range(WORK_ROWS))
 _CHUNK = np.uint64(CHUNK)
-_P0, _P1, _P2, _P3, _P4, _P5, _P6, _P7, _P8, _P9, _P10, _P11, _P12, _P13 = (np.uint64(k) for k in range(14))
+(_P0, _P1, _P2, _P3, _P4, _P5, _P6, _P7, _P8, _P9, _P10, _P11, _P12, _P13, _P14, _P15, _P16, _P17) = (
+    np.uint64(k) for k in range(18))
 
 
 @njit(**OPTIONS)
@@ -78,10 +82,14 @@ def project(vertices, cam, proj, snapped, depth):
 
 
 @njit(**OPTIONS)
-def bin_triangles(faces, snapped, depth, width, height, face_materials, inside, kind, first, last, starts):
-    """Fill kind (m,) with materials (``inside`` for back faces) and return the triangles of each band, in order."""
+def bin_triangles(faces, snapped, depth, width, height, face_materials, inside, kind, first, last, starts, columns):
+    """Fill kind (m,) with materials (``inside`` for back faces) and return the triangles of each band, in order.
+
+    columns (bands, 2): the first and the last block of four pixels that a band's triangles may touch.
+    """
     bands = len(starts) - 1
     starts[:] = 0
+    columns[:, 0], columns[:, 1] = width >> 2, -1
     for t in range(len(faces)):
         a, b, c = faces[t, 0], faces[t, 1], faces[t, 2]
         first[t], last[t] = 0, -1
@@ -99,6 +107,7 @@ def bin_triangles(faces, snapped, depth, width, height, face_materials, inside, 
         first[t], last[t] = top // BAND_ROWS, bottom // BAND_ROWS
         for band in range(first[t], last[t] + 1):
             starts[band + 1] += 1
+            columns[band, 0], columns[band, 1] = min(columns[band, 0], left >> 2), max(columns[band, 1], right >> 2)
     for band in range(bands):
         starts[band + 1] += starts[band]
     items = np.empty(starts[bands], np.int32)
@@ -110,28 +119,30 @@ def bin_triangles(faces, snapped, depth, width, height, face_materials, inside, 
     return items
 
 
-def _rows(integer):
+def _rows(integer, lane_depth):
     """Return the loop over a triangle's blocks for edge functions of one integer type."""
 
     @njit(**OPTIONS)
-    def rows(buffer, offsets, depths, at, pitch, height, count, e0, e1, e2, dx0, dx1, dx2, dy0, dy1, dy2, z, zx, zy,
-             triangle):
+    def rows(buffer, at, pitch, height, count, e0, e1, e2, dx0, dx1, dx2, dy0, dy1, dy2, z, zx, zy, triangle):
+        a0, a1, a2, b0, b1, b2 = integer(dx0), integer(dx1), integer(dx2), integer(dy0), integer(dy1), integer(dy2)
         s0, s1, s2 = integer(-1024 * dy0), integer(-1024 * dy1), integer(-1024 * dy2)
-        d0, d1, d2 = integer(256 * dx0), integer(256 * dx1), integer(256 * dx2)
         step = _wrapped(1024.0 * zx)
         for row in range(height):
-            p, f0, f1, f2, near = at, integer(e0), integer(e1), integer(e2), _wrapped(z + 256.0 * row * zy)
+            p, near = at, _wrapped(z + 256.0 * row * zy)
+            f0, f1, f2 = integer(e0 + row * 256 * dx0), integer(e1 + row * 256 * dx1), integer(e2 + row * 256 * dx2)
             for _ in range(count):
                 for lane in range(_LANES):
-                    inside = (integer(f0 + offsets[lane]) | integer(f1 + offsets[_LANES + lane])
-                              | integer(f2 + offsets[_LANES2 + lane]))
-                    here, old = np.int32(near + depths[lane]), buffer[p + lane]
+                    # What does not change from block to block is taken out of the loop by the compiler.
+                    x, y = _LANE_X[lane], _LANE_Y[lane]
+                    inside = (integer(f0 + integer(integer(a0 * y) - integer(b0 * x)))
+                              | integer(f1 + integer(integer(a1 * y) - integer(b1 * x)))
+                              | integer(f2 + integer(integer(a2 * y) - integer(b2 * x))))
+                    here, old = np.int32(near + lane_depth(zx * x + zy * y)), buffer[p + lane]
                     take = (inside >= 0) & (here >= old)
                     buffer[p + lane] = here if take else old
                     buffer[p + _LANES + lane] = triangle if take else buffer[p + _LANES + lane]
                 f0, f1, f2, near = integer(f0 + s0), integer(f1 + s1), integer(f2 + s2), np.int32(near + step)
                 p += _BLOCK
-            e0, e1, e2 = e0 + d0, e1 + d1, e2 + d2
             at += pitch
 
     return rows
@@ -143,12 +154,12 @@ def _wrapped(value):
     return np.int32(np.int64(value))
 
 
-_narrow, _wide = _rows(np.int32), _rows(np.int64)
+_narrow, _wide = _rows(np.int32, np.int32), _rows(np.int64, _wrapped)
 
 
 @njit(**OPTIONS)
-def _scan(buffer, offsets, offsets64, depths, faces, snapped, depth, triangle, top, bottom, width, columns):
-    """Draw a triangle into the band's rows top..bottom; ``columns`` (2,) grows to the blocks touched.
+def _scan(buffer, faces, snapped, depth, triangle, top, bottom, width):
+    """Draw a triangle into the band's rows top..bottom.
 
     Corners are whole sub-pixels, so the edge functions are exact: with the top-left rule a sample on a shared edge
     belongs to one of its triangles.
@@ -166,8 +177,6 @@ def _scan(buffer, offsets, offsets64, depths, faces, snapped, depth, triangle, t
     left, right = max((low + 31) >> 8, 0) >> 2, min((high - 32) >> 8, width - 1) >> 2
     if first > last or left > right:
         return
-    columns[0], columns[1] = min(columns[0], left), max(columns[1], right)
-
     dx0, dy0, dx1, dy1, dx2, dy2 = xb - xa, yb - ya, xc - xb, yc - yb, xa - xc, ya - yc
     scale = 1.0 / area
     zx, zy = ((zc - za) * dy0 + (zb - za) * dy2) * -scale, ((zc - za) * dx0 + (zb - za) * dx2) * scale
@@ -185,108 +194,121 @@ def _scan(buffer, offsets, offsets64, depths, faces, snapped, depth, triangle, t
     pitch = np.uint64(((width + 3) >> 2) * _ROW_BLOCK)
     at = np.uint64((first - top) * ((width + 3) >> 2) + left) * _BLOCK
     if high - low <= _SMALL and down - up <= _SMALL and abs(zx) + abs(zy) < _GENTLE:
-        a0, b0, a1, b1, a2, b2 = (np.int32(dx0), np.int32(dy0), np.int32(dx1), np.int32(dy1), np.int32(dx2),
-                                  np.int32(dy2))
-        for lane in range(_LANES):
-            x32, y32 = _LANE_X[lane], _LANE_Y[lane]
-            offsets[lane] = np.int32(a0 * y32 - b0 * x32)
-            offsets[_LANES + lane] = np.int32(a1 * y32 - b1 * x32)
-            offsets[_LANES2 + lane] = np.int32(a2 * y32 - b2 * x32)
-            depths[lane] = np.int32(zx * x32 + zy * y32)
-        _narrow(buffer, offsets, depths, at, pitch, last - first + 1, right - left + 1, e0, e1, e2,
+        _narrow(buffer, at, pitch, last - first + 1, right - left + 1, e0, e1, e2,
                 dx0, dx1, dx2, dy0, dy1, dy2, z, zx, zy, np.int32(triangle))
     else:
-        for lane in range(_LANES):
-            x64, y64 = np.int64(_LANE_X[lane]), np.int64(_LANE_Y[lane])
-            offsets64[lane] = dx0 * y64 - dy0 * x64
-            offsets64[_LANES + lane] = dx1 * y64 - dy1 * x64
-            offsets64[_LANES2 + lane] = dx2 * y64 - dy2 * x64
-            depths[lane] = _wrapped(zx * x64 + zy * y64)
-        _wide(buffer, offsets64, depths, at, pitch, last - first + 1, right - left + 1, e0, e1, e2,
+        _wide(buffer, at, pitch, last - first + 1, right - left + 1, e0, e1, e2,
               dx0, dx1, dx2, dy0, dy1, dy2, z, zx, zy, np.int32(triangle))
 
 
 @njit(**OPTIONS)
 def _angle(sine, cosine):
-    """Return atan2 for a sine of 0 or more, within 2e-6: what weighs a triangle needs no more.
+    """Return atan2 for a sine of 0 or more, within 1e-5: what weighs a triangle needs no more.
 
     Based on: the odd minimax polynomial of the arc tangent on 0..1, as in Hastings, "Approximations for digital
     computers", 1955.
     """
     size = abs(cosine)
-    ratio = min(sine, size) / max(max(sine, size), 1e-300)
+    ratio = min(sine, size) / max(max(sine, size), np.float32(1e-30))
     s = ratio * ratio
-    angle = ratio * (0.99997726 + s * (-0.33262347 + s * (0.19354346 + s * (
-        -0.11643287 + s * (0.05265332 + s * -0.01172120)))))
+    angle = ratio * (np.float32(0.99997726) + s * (np.float32(-0.33262347) + s * (np.float32(0.19354346) + s * (
+        np.float32(-0.11643287) + s * (np.float32(0.05265332) + s * np.float32(-0.01172120))))))
     if sine > size:
-        angle = 0.5 * math.pi - angle
-    return math.pi - angle if cosine < 0.0 else angle
+        angle = np.float32(0.5 * math.pi) - angle
+    return np.float32(math.pi) - angle if cosine < 0 else angle
 
 
 @njit(**OPTIONS)
-def _normal(vertices, starts, ring, v, out):
-    """Write the unit normal of a vertex, world axes: its triangles' normals, each by its angle there."""
-    x, y, z = vertices[v, 0], vertices[v, 1], vertices[v, 2]
-    nx = ny = nz = 0.0
-    for k in range(starts[v], starts[v + 1]):
-        p, q = ring[k, 0], ring[k, 1]
-        ax, ay, az = vertices[p, 0] - x, vertices[p, 1] - y, vertices[p, 2] - z
-        bx, by, bz = vertices[q, 0] - x, vertices[q, 1] - y, vertices[q, 2] - z
-        cx, cy, cz = ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
-        size = math.sqrt(cx * cx + cy * cy + cz * cz)
-        if size > 0.0:
-            weight = _angle(size, ax * bx + ay * by + az * bz) / size
-            nx, ny, nz = nx + weight * cx, ny + weight * cy, nz + weight * cz
-    size = math.sqrt(nx * nx + ny * ny + nz * nz)
-    scale = 1.0 / size if size > 0.0 else 0.0
-    out[0], out[1], out[2] = nx * scale, ny * scale, nz * scale
+def all_normals(vertices, faces, work, normals):
+    """Fill normals (n, 3) float32, world axes: the triangles' normals, each by its angle at the vertex.
+
+    work (6 * CHUNK,): two edges of each triangle of a chunk, which become its unit normal and its angles.
+    """
+    normals[:] = 0
+    m = np.uint64(len(faces))
+    for first in range(np.uint64(0), m, _CHUNK):
+        count = min(m - first, _CHUNK)
+        for i in range(count):
+            a, b, c = (np.uint64(faces[first + i, _P0]), np.uint64(faces[first + i, _P1]),
+                       np.uint64(faces[first + i, _P2]))
+            for k in range(_P3):
+                work[k * _CHUNK + i] = vertices[b, k] - vertices[a, k]
+                work[(_P3 + k) * _CHUNK + i] = vertices[c, k] - vertices[a, k]
+        for i in range(count):
+            ux, uy, uz = work[i], work[_CHUNK + i], work[_P2 * _CHUNK + i]
+            vx, vy, vz = work[_P3 * _CHUNK + i], work[_P4 * _CHUNK + i], work[_P5 * _CHUNK + i]
+            nx, ny, nz = uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
+            size = np.float32(math.sqrt(nx * nx + ny * ny + nz * nz))
+            uv = ux * vx + uy * vy + uz * vz
+            at_a = _angle(size, uv)
+            at_b = _angle(size, ux * ux + uy * uy + uz * uz - uv)
+            scale = np.float32(1) / max(size, np.float32(1e-30))
+            work[i], work[_CHUNK + i], work[_P2 * _CHUNK + i] = nx * scale, ny * scale, nz * scale
+            work[_P3 * _CHUNK + i], work[_P4 * _CHUNK + i] = at_a, at_b
+            work[_P5 * _CHUNK + i] = np.float32(math.pi) - at_a - at_b
+        for i in range(count):
+            for corner in range(_P3):
+                v = np.uint64(faces[first + i, corner])
+                weight = work[(_P3 + corner) * _CHUNK + i]
+                normals[v, _P0] += weight * work[i]
+                normals[v, _P1] += weight * work[_CHUNK + i]
+                normals[v, _P2] += weight * work[_P2 * _CHUNK + i]
+    for v in range(np.uint64(len(normals))):
+        nx, ny, nz = normals[v, _P0], normals[v, _P1], normals[v, _P2]
+        scale = np.float32(1) / max(np.float32(math.sqrt(nx * nx + ny * ny + nz * nz)), np.float32(1e-30))
+        normals[v, _P0], normals[v, _P1], normals[v, _P2] = nx * scale, ny * scale, nz * scale
 
 
 @njit(**OPTIONS)
-def all_normals(vertices, starts, ring, normals):
-    """Fill normals (n, 3) of all vertices, world axes."""
-    for v in range(len(vertices)):
-        _normal(vertices, starts, ring, v, normals[v])
+def fill_attributes(normals, light, cam, attributes):
+    """Fill attributes (n, 4 + lights): the normal in camera axes, then the shares of light."""
+    shares = light.shape[1]
+    for v in range(np.uint64(len(attributes))):
+        attributes[v, _P0], attributes[v, _P1], attributes[v, _P2] = _turned(
+            cam, normals[v, _P0], normals[v, _P1], normals[v, _P2])
+        for k in range(np.uint64(shares)):
+            attributes[v, _P3 + k] = light[v, k]
 
 
 @njit(**OPTIONS)
-def _prepare(t, vertices, faces, proj, cam, flat, starts, ring, known, attributes, vertex_ready, planes, ready,
-             scratch):
-    """Work out what shading asks of a triangle: corner weights as functions of the pixel, and normals.
+def _prepare(t, vertices, faces, proj, cam, flat, planes, ready):
+    """Work out what shading asks of a triangle that owns a pixel: its corners' weights as functions of the pixel.
 
-    The functions are those of `shading._corner_weights`. planes (m, 14): nine coefficients, the origin's x and y,
+    The functions are those of `shading._corner_weights`. planes (m, 16): nine coefficients, the origin's x and y,
     and for flat shading the normal.
     """
-    a, b, c = faces[t, 0], faces[t, 1], faces[t, 2]
-    ox, oy = proj[a, 0], proj[a, 1]
-    ortho, near = cam[16] != 0.0, cam[17]
-    wa = 1.0 if ortho else max(proj[a, 2], near)
-    wb = 1.0 if ortho else max(proj[b, 2], near)
-    wc = 1.0 if ortho else max(proj[c, 2], near)
-    xb, yb, xc, yc = (proj[b, 0] - ox) * wb, (proj[b, 1] - oy) * wb, (proj[c, 0] - ox) * wc, (proj[c, 1] - oy) * wc
+    t = np.uint64(t)
+    a, b, c = np.uint64(faces[t, _P0]), np.uint64(faces[t, _P1]), np.uint64(faces[t, _P2])
+    ox, oy = proj[a, _P0], proj[a, _P1]
+    ortho, near = cam[_P16] != 0.0, cam[_P17]
+    wa = 1.0 if ortho else max(proj[a, _P2], near)
+    wb = 1.0 if ortho else max(proj[b, _P2], near)
+    wc = 1.0 if ortho else max(proj[c, _P2], near)
+    xb, yb = (proj[b, _P0] - ox) * wb, (proj[b, _P1] - oy) * wb
+    xc, yc = (proj[c, _P0] - ox) * wc, (proj[c, _P1] - oy) * wc
     whole = wa * (xb * yc - yb * xc)
     scale = 1.0 / whole if whole != 0.0 else 1.0
-    p = planes[t]
-    p[0], p[1], p[2] = (yb * wc - wb * yc) * scale, (wb * xc - xb * wc) * scale, (xb * yc - yb * xc) * scale
-    p[3], p[4], p[5] = yc * wa * scale, -xc * wa * scale, 0.0
-    p[6], p[7], p[8] = -wa * yb * scale, wa * xb * scale, 0.0
-    p[9], p[10] = ox, oy
+    planes[t, _P0] = (yb * wc - wb * yc) * scale
+    planes[t, _P1] = (wb * xc - xb * wc) * scale
+    planes[t, _P2] = (xb * yc - yb * xc) * scale
+    planes[t, _P3], planes[t, _P4] = yc * wa * scale, -xc * wa * scale
+    planes[t, _P6], planes[t, _P7] = -wa * yb * scale, wa * xb * scale
+    planes[t, _P9], planes[t, _P10] = ox, oy
     if flat:
-        ux, uy, uz = vertices[b, 0] - vertices[a, 0], vertices[b, 1] - vertices[a, 1], vertices[b, 2] - vertices[a, 2]
-        vx, vy, vz = vertices[c, 0] - vertices[a, 0], vertices[c, 1] - vertices[a, 1], vertices[c, 2] - vertices[a, 2]
-        scratch[0], scratch[1], scratch[2] = uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
-        for k in range(3):
-            p[11 + k] = cam[3 * k] * scratch[0] + cam[3 * k + 1] * scratch[1] + cam[3 * k + 2] * scratch[2]
-    elif not known:
-        for corner in range(3):
-            v = faces[t, corner]
-            if not vertex_ready[v]:
-                _normal(vertices, starts, ring, v, scratch)
-                for k in range(3):
-                    attributes[v, k] = (cam[3 * k] * scratch[0] + cam[3 * k + 1] * scratch[1]
-                                        + cam[3 * k + 2] * scratch[2])
-                vertex_ready[v] = 1
+        ux, uy, uz = (vertices[b, _P0] - vertices[a, _P0], vertices[b, _P1] - vertices[a, _P1],
+                      vertices[b, _P2] - vertices[a, _P2])
+        vx, vy, vz = (vertices[c, _P0] - vertices[a, _P0], vertices[c, _P1] - vertices[a, _P1],
+                      vertices[c, _P2] - vertices[a, _P2])
+        planes[t, _P11], planes[t, _P12], planes[t, _P13] = _turned(
+            cam, uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx)
     ready[t] = 1
+
+
+@njit(**OPTIONS)
+def _turned(cam, x, y, z):
+    """Return a vector in camera axes."""
+    return (cam[_P0] * x + cam[_P1] * y + cam[_P2] * z, cam[_P3] * x + cam[_P4] * y + cam[_P5] * z,
+            cam[_P6] * x + cam[_P7] * y + cam[_P8] * z)
 
 
 @njit(**OPTIONS)
@@ -298,8 +320,8 @@ def _gather(count, kind, entry, target, top, work, faces, attributes, planes, ma
     for i in range(np.uint64(count)):
         t = np.uint64(entry[i])
         place = target[i]
-        x = np.float32((place & _ROW_MASK) >> 3) + _SPOT_X[np.uint64(place & 7)]
-        y = np.float32((place >> _ROW_SHIFT) + top) + _SPOT_Y[np.uint64(place & 7)]
+        x = np.float32((place & _ROW_MASK) >> 4) + _SPOT_X[np.uint64(place & 15)]
+        y = np.float32((place >> _ROW_SHIFT) + top) + _SPOT_Y[np.uint64(place & 15)]
         dx, dy = x - planes[t, _P9], y - planes[t, _P10]
         u = max(planes[t, _P0] * dx + planes[t, _P1] * dy + planes[t, _P2], np.float32(0))
         v = max(planes[t, _P3] * dx + planes[t, _P4] * dy, np.float32(0))
@@ -412,68 +434,62 @@ def _light(count, look, lamps, sky, view, work):
 
 
 @njit(**OPTIONS)
-def draw_bands(start, stop, step, items, starts, vertices, faces, proj, snapped, depth, kind, inside, cam, flat, known,
-               adjacency, ring, attributes, vertex_ready, planes, ready, material, lamps, sky, view, powers,
-               encode, behind, transparent, picture):
+def draw_bands(start, stop, step, items, starts, columns, vertices, faces, proj, snapped, depth, kind, inside, cam,
+               flat, attributes, planes, ready, material, lamps, sky, view, powers, encode, behind, transparent,
+               picture):
     """Draw the bands start, start + step, ... before stop over picture (h, w) uint32, which holds the background."""
     height, width = picture.shape
     row_blocks = (width + 3) >> 2
     buffer = np.empty(BAND_ROWS * row_blocks * _ROW_BLOCK, np.int32)
     colour = np.empty(BAND_ROWS * row_blocks * 16, np.float32)             # r, g, b, cover of each pixel
-    offsets, offsets64 = np.empty(48, np.int32), np.empty(48, np.int64)
-    depths, columns = np.empty(16, np.int32), np.empty(2, np.int64)
     kinds = len(material)
     entry, target = np.empty((kinds, CHUNK), np.int32), np.empty((kinds, CHUNK), np.int32)
     filled = np.zeros(kinds, np.int64)
     work = np.empty((WORK_ROWS + len(lamps)) * CHUNK, np.float32)
-    scratch = np.empty(3, np.float64)
     for band in range(start, stop, step):
         if starts[band] == starts[band + 1]:
             continue
         top, bottom = band * BAND_ROWS, min((band + 1) * BAND_ROWS, height)
-        buffer[:] = 0
-        columns[0], columns[1] = row_blocks, -1
+        left, right = columns[band, 0], columns[band, 1] + 1
+        for row in range(0, row_blocks * (bottom - top), row_blocks):
+            buffer[_ROW_BLOCK * (row + left):_ROW_BLOCK * (row + right)] = 0
+            colour[16 * (row + left):16 * (row + right)] = 0
         for k in range(starts[band], starts[band + 1]):
-            _scan(buffer, offsets, offsets64, depths, faces, snapped, depth, items[k], top, bottom, width, columns)
-        left, right = 4 * columns[0], min(4 * columns[1] + 4, width)
-        colour[:] = 0
+            _scan(buffer, faces, snapped, depth, items[k], top, bottom, width)
+        left, right = 4 * left, min(4 * right, width)
         for row in range(bottom - top):
             for x in range(left, right):
                 p = np.uint64((row * row_blocks + (x >> 2)) * _ROW_BLOCK + 4 * (x & 3))
-                d0, d1, d2, d3 = buffer[p], buffer[p + _P1], buffer[p + _P2], buffer[p + _P3]
-                if (d0 | d1 | d2 | d3) == 0:
+                if (buffer[p] | buffer[p + _P1] | buffer[p + _P2] | buffer[p + _P3]) == 0:
                     continue
-                place = (row << _ROW_SHIFT) + (x << 3)
-                p += _LANES
-                if min(d0, d1, d2, d3) > 0 and max(d0, d1, d2, d3) - min(d0, d1, d2, d3) < _STEP:
-                    t = buffer[p + _P1]
-                    own = kind[np.uint64(t)]
-                    if (kind[np.uint64(buffer[p])] == own and kind[np.uint64(buffer[p + _P2])] == own
-                            and kind[np.uint64(buffer[p + _P3])] == own):
-                        n = np.uint64(filled[own])
-                        entry[own, n], target[own, n] = t, place + _CENTRE
-                        filled[own] = n + _P1
-                        if not ready[np.uint64(t)]:
-                            _prepare(t, vertices, faces, proj, cam, flat, adjacency, ring, known, attributes,
-                                     vertex_ready, planes, ready, scratch)
-                        if n + _P1 == _CHUNK:
-                            _flush(own, filled, entry, target, top, row_blocks, work, faces, attributes, planes,
-                                   material, flat, inside, powers, lamps, sky, view, colour)
-                        continue
+                left_over = 15
                 for sample in range(4):
-                    if buffer[p - _LANES + np.uint64(sample)] == 0:
+                    if not left_over >> sample & 1:
                         continue
-                    t = buffer[p + np.uint64(sample)]
+                    at = p + np.uint64(sample)
+                    nearest = buffer[at]
+                    if nearest == 0:
+                        continue
+                    t = buffer[at + _LANES]
                     own = kind[np.uint64(t)]
+                    mask = 1 << sample
+                    for other in range(sample + 1, 4):
+                        at = p + np.uint64(other)
+                        if (abs(np.int64(buffer[at]) - nearest) < _STEP
+                                and (buffer[at + _LANES] == t or kind[np.uint64(buffer[at + _LANES])] == own)
+                                and left_over >> other & 1):
+                            mask |= 1 << other
+                    left_over &= ~mask
                     n = np.uint64(filled[own])
-                    entry[own, n], target[own, n] = t, place + sample
+                    entry[own, n], target[own, n] = t, (row << _ROW_SHIFT) + (x << 4) + mask
                     filled[own] = n + _P1
                     if not ready[np.uint64(t)]:
-                        _prepare(t, vertices, faces, proj, cam, flat, adjacency, ring, known, attributes,
-                                 vertex_ready, planes, ready, scratch)
+                        _prepare(t, vertices, faces, proj, cam, flat, planes, ready)
                     if n + _P1 == _CHUNK:
                         _flush(own, filled, entry, target, top, row_blocks, work, faces, attributes, planes,
                                material, flat, inside, powers, lamps, sky, view, colour)
+                    if left_over == 0:
+                        break
         for own in range(kinds):
             if filled[own]:
                 _flush(own, filled, entry, target, top, row_blocks, work, faces, attributes, planes, material, flat,
@@ -492,8 +508,8 @@ def _flush(kind, filled, entry, target, top, row_blocks, work, faces, attributes
     places, pitch = target[kind], 16 * row_blocks
     for i in range(np.uint64(count)):
         place = places[i]
-        at = np.uint64((place >> _ROW_SHIFT) * pitch + 4 * ((place & _ROW_MASK) >> 3))
-        share = np.float32(1) if place & 7 == _CENTRE else np.float32(0.25)
+        at = np.uint64((place >> _ROW_SHIFT) * pitch + 4 * ((place & _ROW_MASK) >> 4))
+        share = _SHARE[np.uint64(place & 15)]
         colour[at] += share * work[_R + i]
         colour[at + _P1] += share * work[_G + i]
         colour[at + _P2] += share * work[_B + i]

@@ -18,7 +18,15 @@ from facegen.errors import InputError
 from facegen.geometry.camera import Camera, check_view, frame
 from facegen.geometry.mesh import Mesh
 from facegen.geometry.normals import face_normals, vertex_normals
-from facegen.render.request import SHADINGS, Rig, check_choice, check_size, neutral_mesh, posed_vertices
+from facegen.render.request import (
+    SHADINGS,
+    Rig,
+    check_choice,
+    check_in_front,
+    check_size,
+    neutral_mesh,
+    posed_vertices,
+)
 from facegen.render.soft import nearness_points
 from facegen.render.zbuffer import prepare, scan
 
@@ -99,6 +107,7 @@ def render_passes(thing: Mesh | Rig, pose: Any = None, *, passes: Sequence[str] 
         _check_possible(name, thing, mesh)
     vertices = posed_vertices(thing, pose, mesh, level, person=person, intensity=intensity)
     camera = camera or frame(mesh.vertices, vertices, size=size, view=view, orthographic=orthographic)
+    check_in_front("pose", vertices, mesh.faces, camera)
     posed = mesh.with_vertices(vertices)
     found = Passes(camera, posed)
     arrays = _arrays(posed, camera, [name for name in wanted if name in _EMPTY], flat=shading == "flat")
@@ -145,9 +154,9 @@ def locate(places: dict[str, NDArray], mesh: Mesh, camera: Camera) -> Points:
 
 def _check_possible(name: str, thing: Mesh | Rig, mesh: Mesh) -> None:
     """Raise InputError for a pass that this thing cannot have."""
-    if name in _POINTS and not hasattr(thing, _POINTS[name]):
+    if name in _POINTS and not (hasattr(thing, _POINTS[name]) and len(getattr(thing, name, [name]))):
         raise InputError(f"passes: {name!r} needs a face that has them, e.g. facegen.load_face(), "
-                         f"got a {type(thing).__name__}")
+                         f"got {getattr(thing, 'name', None) or 'a ' + type(thing).__name__}")
     names = {"part": mesh.parts, "material": mesh.materials}.get(name, ())
     if len(names) > _MOST_NAMES:
         raise InputError(f"passes: {name!r} can tell {_MOST_NAMES} names apart, the mesh has {len(names)}; "
@@ -163,7 +172,7 @@ def _arrays(mesh: Mesh, camera: Camera, wanted: list[str], *, flat: bool) -> dic
            for name in wanted}
     projected = camera.project(mesh.vertices)[mesh.faces]
     # The triangles of the side that is seen: clockwise in pixels, whose y runs down.
-    back = _twice_area(projected) > 0
+    back = twice_area(projected) > 0
     normals = (face_normals if flat else vertex_normals)(mesh.vertices, mesh.faces) @ camera.rotation.T
     for rows, columns, ids in _seen(mesh, camera):
         if "triangle" in out:
@@ -216,7 +225,7 @@ def _held(weights: NDArray) -> NDArray[np.float64]:
     return weights / weights.sum(axis=1, keepdims=True)
 
 
-def _twice_area(projected: NDArray) -> NDArray[np.float64]:
+def twice_area(projected: NDArray) -> NDArray[np.float64]:
     """Return twice the signed area, in pixels, of projected triangles (m, 3 corners, 3)."""
     (ax, ay), (bx, by) = ((projected[:, k, :2] - projected[:, 0, :2]).T for k in (1, 2))
     return ax * by - bx * ay

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -12,6 +14,7 @@ from facegen.render.occlusion import visibility
 from facegen.render.request import Look
 from facegen.render.scene import Scene
 from facegen.render.shading import from_srgb, shade, surface, to_srgb
+from facegen.render.shadow import with_shadows
 from facegen.render.zbuffer import prepare, scan
 
 # Samples held at once: the picture is drawn in bands, so that its size does not decide the memory.
@@ -33,6 +36,8 @@ class SoftBackend:
         seen = None if baked is None else visibility(baked)
         normals = None if baked is None or baked is mesh else vertex_normals(baked.vertices, baked.faces)
         prepared = surface(mesh, camera, scene, flat=look.flat, seen=seen, seen_normals=normals)
+        if look.shadows:
+            prepared = replace(prepared, light=with_shadows(prepared.light, mesh, camera, scene))
         width, height = camera.width, camera.height
         triangles = prepare(nearness_points(mesh.vertices, camera), mesh.faces, width=width, height=height, samples=4)
         picture = np.empty((height, width, 4), np.uint8)
@@ -59,27 +64,27 @@ def nearness_points(vertices: NDArray, camera: Camera) -> NDArray[np.float64]:
 def _band(triangles, prepared, camera, scene, top, bottom) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
     """Return premultiplied linear light (3, rows, width) and coverage (rows, width) of some pixel rows.
 
-    A pixel whose four samples see one continuous piece of one material is shaded once, at its centre; any
-    other pixel four times, at its samples.
+    Samples of a pixel that see one continuous piece of one material are shaded once, in their middle.
     """
     ids, nearness = scan(triangles, top, bottom)
     rows, samples, width = ids.shape
     light = np.zeros((3, rows, width), np.float32)
     hit = ids >= 0
     cover = hit.mean(axis=1, dtype=np.float32)
-    kind = np.where(hit, (2 * prepared.material + prepared.back)[ids], -1)
-    one = ((kind == kind[:, :1]).all(axis=1) & hit[:, 0]
-           & (nearness.max(axis=1) - nearness.min(axis=1) < np.float32(DEPTH_STEP)))
-    y, x = np.nonzero(one)
-    light[:, y, x] = shade(prepared, camera, scene, ids[y, 1, x], x + 0.5, y + (top + 0.5))
-
-    y, x = np.nonzero(hit.any(axis=1) & ~one)
-    mixed = ids[y, :, x]                                                        # (k, samples)
-    k, s = np.nonzero(mixed >= 0)
-    total = np.zeros((3, len(y), samples), np.float32)
-    across, down = np.array(triangles.sample_x)[s], top + (s + 0.5) / samples
-    total[:, k, s] = shade(prepared, camera, scene, mixed[k, s], x[k] + across, y[k] + down)
-    light[:, y, x] = total.mean(axis=2)
+    y, x = np.nonzero(cover)
+    ids, nearness = ids[y, :, x], nearness[y, :, x]                              # (k, samples)
+    kind = np.where(ids >= 0, prepared.material[ids], -1)
+    free = ids >= 0
+    across, down = np.array(triangles.sample_x), (np.arange(samples) + 0.5) / samples
+    for leader in range(samples):
+        k = np.flatnonzero(free[:, leader])
+        near = np.abs(nearness[k] - nearness[k, leader, None]) < np.float32(DEPTH_STEP)
+        group = free[k] & near & (kind[k] == kind[k, leader, None])
+        count = group.sum(axis=1)
+        colours = shade(prepared, camera, scene, ids[k, leader], x[k] + group @ across / count,
+                        top + y[k] + group @ down / count)
+        light[:, y[k], x[k]] += colours * (count / samples).astype(np.float32)
+        free[k] &= ~group
     return light, cover
 
 

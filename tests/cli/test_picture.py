@@ -33,6 +33,12 @@ def test_a_picture(run, tmp_path):
     (["--background", "1,2,3"], {"background": (1, 2, 3)}),
     (["--person", "mika"], {"person": "mika"}),
     (["--intensity", "0.4"], {"intensity": 0.4}),
+    (["--orthographic"], {"orthographic": True}),
+    (["--renderer", "soft"], {"renderer": "soft"}),
+    (["--occlusion", "off"], {"occlusion": "off"}),
+    (["--shadows"], {"shadows": True}),
+    (["--wireframe"], {"wireframe": True}),
+    (["--cage", "--detail", "1"], {"wireframe": facegen.Wireframe(lines="cage"), "detail": 1}),
 ])
 def test_options_mean_what_the_api_means(run, tmp_path, options, arguments):
     out = tmp_path / "a.png"
@@ -66,6 +72,32 @@ def test_a_preset_by_its_short_name_is_the_preset(run):
                     for name in ("figure-8", "akimoto-1986-figure-8"))
     assert short["deformation"] == whole["deformation"]
     assert short["deformation"]["points"]["F8"] == [-0.07, 0.0, -0.07]
+
+
+def test_passes_are_written_beside_the_picture(run, tmp_path):
+    out = tmp_path / "smile.png"
+    (tmp_path / "smile").mkdir()                    # a folder of that name is left alone
+    options = ["--size", "64", "--view", "20", "--detail", "0", "--orthographic"]
+    code, text, _ = run("render", "happiness", "-o", out, *options, "--passes", "depth, part,feature_points", "--npz",
+                        "--json")
+    names = {"depth": "smile.depth.png", "part": "smile.part.png", "feature_points": "smile.feature_points.json",
+             "passes": "smile.passes.json", "arrays": "smile.passes.npz"}
+    assert code == 0
+    assert json.loads(text)["passes"] == {name: str(tmp_path / file) for name, file in names.items()}
+    assert {p.name for p in tmp_path.iterdir()} == {"smile", "smile.png", *names.values()}
+    expected = facegen.render_passes(facegen.load_face(), "happiness", passes=("depth", "part"), size=64, view=(20, 0),
+                                     detail=0, orthographic=True)
+    with np.load(tmp_path / names["arrays"]) as arrays:
+        np.testing.assert_array_equal(arrays["depth"], expected["depth"])
+        np.testing.assert_array_equal(arrays["part"], expected["part"])
+
+
+def test_a_pass_that_cannot_be_written_is_said_before_any_work(run, tmp_path):
+    (tmp_path / "a.depth.png").mkdir()
+    code, _, err = run("render", "happiness", "-o", tmp_path / "a.png", "--size", 48, "--passes", "depth")
+    assert code == 2
+    assert "a.depth.png: is a folder" in err
+    assert [p.name for p in tmp_path.iterdir()] == ["a.depth.png"]
 
 
 def test_json(run, tmp_path):
@@ -107,6 +139,11 @@ def test_quiet_warns_of_nothing(run, tmp_path):
     (["happiness", "-o", "a.png", "--size", "5000"], "4096"),
     (["happiness", "-o", "a.png", "--background", "blueish"], "--background"),
     (["happiness", "-o", "a.png", "--background", "1,2,300"], "0..255"),
+    (["happiness", "-o", "a.png", "--renderer", "sofd"], "did you mean 'soft'"),
+    (["happiness", "-o", "a.png", "--occlusion", "none"], "posed, neutral, off"),
+    (["happiness", "-o", "a.png", "--passes", "dept"], "did you mean 'depth'"),
+    (["happiness", "-o", "a.png", "--passes", ""], "passes: expected"),
+    (["happiness", "-o", "a.png", "--npz"], "--npz"),
 ])
 def test_wrong_wishes(run, tmp_path, monkeypatch, argv, words):
     monkeypatch.chdir(tmp_path)

@@ -63,12 +63,6 @@ def test_random_triangles_are_covered_alike(seed, stretch):
     assert different(soft, fast) <= 0.001
 
 
-def test_a_camera_before_half_of_the_mesh():
-    camera = replace(Renderer(SEVERAL, size=96).camera, distance=0.4)
-    soft, fast = both(SEVERAL, camera=camera, occlusion="off")
-    assert different(soft, fast) <= 0.001
-
-
 def test_the_threads_make_no_difference():
     face = load_face()
     one, three = (render(face, "fear", renderer="fast", size=300, threads=threads) for threads in (1, 3))

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import json
+
 import numpy as np
 import pytest
+from PIL import Image
 from shapes import box, sphere
 
 from facegen import load_face
-from facegen.errors import InputError
+from facegen.errors import FileError, InputError
 from facegen.geometry.mesh import Mesh, merge
-from facegen.render import PASSES, render, render_passes
+from facegen.render import PASSES, render, render_passes, save_passes
 from facegen.render.passes import ARRAY_PASSES
 
 BALL = sphere()
@@ -156,6 +159,20 @@ def test_feature_points_are_where_the_camera_projects_them():
     assert np.median(np.abs(found["depth"][y, x] - points.depth[points.visible])) < 1.0
 
 
+def test_landmarks_are_where_the_camera_projects_them():
+    face = load_face()
+    found = render_passes(face, "surprise", passes=("landmarks",), size=128, view=(-25, 10), detail=1)
+    points = found["landmarks"]
+    places = face.landmark_points(face.pose("surprise", detail=1), detail=1)
+    assert points.names == tuple(places) == face.landmarks
+    np.testing.assert_array_equal(np.column_stack([points.xy, points.depth]),
+                                  found.camera.project(np.array(list(places.values()))))
+    seen = dict(zip(points.names, points.visible.tolist(), strict=True))
+    assert all(seen[name] for name in ("nose_tip", "chin", "mouth_top", "mouth_bottom", "eye_outer_R", "brow_mid_R"))
+    behind = render_passes(face, "surprise", passes=("landmarks",), size=128, view=(180, 0), detail=1)["landmarks"]
+    assert not behind.visible[points.names.index("nose_tip")]
+
+
 def test_feature_points_follow_the_pose_and_the_level():
     face = load_face()
     rest, smile = (face.feature_point_places(face.pose(what, detail=2)) for what in ("neutral", "happiness"))
@@ -202,11 +219,21 @@ def test_zero_area_triangles_hide_nothing_and_change_nothing():
         np.testing.assert_allclose(after[name], before[name], atol=1e-6)
 
 
+class Bare(Needle):
+    """A rig whose data hold no landmarks."""
+
+    name, landmarks = "bare", ()
+
+    def landmark_points(self, vertices, *, detail):
+        return {}
+
+
 @pytest.mark.parametrize(("call", "message"), [
     (lambda: render_passes(BALL, passes=["dept"]), r"^passes: expected .*got 'dept'; did you mean 'depth'"),
     (lambda: render_passes(BALL, passes="depth"), r"^passes: expected a list of names .*got 'depth'"),
     (lambda: render_passes(BALL, passes=[]), r"^passes: expected a list"),
     (lambda: render_passes(BALL, passes=["landmarks"]), r"^passes: 'landmarks' needs a face .*got a Mesh"),
+    (lambda: render_passes(Bare(), passes=["landmarks"]), r"^passes: 'landmarks' needs a face .*got bare"),
     (lambda: render_passes(BALL, passes=["feature_points"]), r"^passes: 'feature_points' needs a face"),
     (lambda: render_passes(BALL, shading="flatt"), r"^shading: .*did you mean 'flat'"),
     (lambda: render_passes(BALL, size=5), r"^size: "),
@@ -222,3 +249,91 @@ def test_wrong_wishes_are_named_at_the_door(call, message):
 
 def test_all_names_are_offered():
     assert PASSES == ("depth", "normal", "part", "material", "triangle", "landmarks", "feature_points")
+
+
+def saved(tmp_path, **options):
+    found = render_passes(load_face(), "surprise", passes=(*ARRAY_PASSES, "feature_points"), size=(72, 64), detail=0,
+                          **options)
+    return found, save_passes(found, tmp_path / "smile", exact=True)
+
+
+@pytest.mark.parametrize("orthographic", [False, True])
+def test_files_give_back_what_was_saved(tmp_path, orthographic):
+    found, paths = saved(tmp_path, orthographic=orthographic, view=(20, 10))
+    assert sorted(p.name for p in tmp_path.iterdir()) == sorted(p.name for p in paths.values()) == sorted([
+        *(f"smile.{name}.png" for name in ARRAY_PASSES), "smile.feature_points.json", "smile.passes.json",
+        "smile.passes.npz"])
+    about = json.loads(paths["passes"].read_text())
+    pictures = {name: Image.open(paths[name]) for name in ARRAY_PASSES}
+
+    raw, depth = np.asarray(pictures["depth"]).astype(float), found["depth"]
+    assert raw.max() == 65535
+    np.testing.assert_array_equal(raw == 0, np.isinf(depth))
+    measured = about["depth"]["offset"] + about["depth"]["step"] * raw
+    np.testing.assert_allclose(measured[raw > 0], depth[raw > 0], atol=0.51 * about["depth"]["step"] + 1e-4)
+
+    raw = np.asarray(pictures["normal"])
+    seen = np.isfinite(depth)
+    assert (raw[~seen] == 0).all()
+    np.testing.assert_allclose(raw[seen] / 127.5 - 1, found["normal"][seen], atol=0.0041)
+
+    for name, names in (("part", found.parts), ("material", found.materials)):
+        assert pictures[name].mode == "P"
+        np.testing.assert_array_equal(np.asarray(pictures[name]), found[name])
+        labels = about[name]["labels"]
+        assert [labels[label]["value"] for label in ("nothing", *names)] == list(range(len(names) + 1))
+        assert len({tuple(label["colour"]) for label in labels.values()}) == len(labels)
+        row, column = np.argwhere(found[name] == 1)[0]
+        assert pictures[name].convert("RGB").getpixel((int(column), int(row))) == tuple(labels[names[0]]["colour"])
+
+    raw = np.asarray(pictures["triangle"]).astype(int)
+    np.testing.assert_array_equal(raw @ [1, 256, 65536] - 1, found["triangle"])
+
+    points = json.loads(paths["feature_points"].read_text())
+    assert tuple(points) == found["feature_points"].names
+    np.testing.assert_allclose([p["xy"] for p in points.values()], found["feature_points"].xy, atol=1e-3)
+    assert [p["visible"] for p in points.values()] == found["feature_points"].visible.tolist()
+    # The camera as data projects the places to where the points are.
+    camera = about["camera"]
+    local = np.array([[*p["place"], 1] for p in points.values()]) @ np.array(camera["extrinsics"]).T
+    assert camera["projection"] == ("orthographic" if orthographic else "perspective")
+    divided = local / (1 if orthographic else local[:, 2:])
+    divided[:, 2] = 1
+    xy = divided @ np.array(camera["intrinsics"]).T
+    np.testing.assert_allclose(xy[:, :2], found["feature_points"].xy, atol=1e-3)
+    np.testing.assert_allclose(local[:, 2], found["feature_points"].depth, atol=1e-3)
+
+    with np.load(paths["arrays"]) as arrays:
+        for name in ARRAY_PASSES:
+            np.testing.assert_array_equal(arrays[name], found[name])
+        np.testing.assert_array_equal(arrays["feature_points_xy"], found["feature_points"].xy)
+
+
+def test_an_empty_view_is_saved_too(tmp_path):
+    camera = render_passes(BALL, size=64).camera
+    away = render_passes(BALL, BALL.vertices + np.array([0, 1000.0, 0]), camera=camera)
+    paths = save_passes(away, f"{tmp_path}/")
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["depth.png", "normal.png", "part.png", "passes.json"]
+    assert (np.asarray(Image.open(paths["depth"])) == 0).all()
+
+
+def test_what_cannot_be_saved_is_said_and_nothing_is_harmed(tmp_path, monkeypatch):
+    with pytest.raises(InputError, match=r"^passes: expected what render_passes returned, got a dict"):
+        save_passes({}, tmp_path / "a")
+    found = render_passes(BALL, size=32, passes=["depth"])
+    with pytest.raises(FileError, match=r"the folder .*nowhere does not exist"):
+        save_passes(found, tmp_path / "nowhere" / "a")
+    (tmp_path / "a.depth.png").mkdir()
+    with pytest.raises(FileError, match="is a folder"):
+        save_passes(found, tmp_path / "a")
+    old = tmp_path / "b.depth.png"
+    old.write_bytes(b"precious")
+
+    def full(*_, **__):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(Image.Image, "save", full)
+    with pytest.raises(FileError, match="depth pass cannot be written: No space left"):
+        save_passes(found, tmp_path / "b")
+    assert old.read_bytes() == b"precious"
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["a.depth.png", "b.depth.png"]

@@ -1,3 +1,4 @@
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -8,7 +9,7 @@ from shapes import box, shuffled, sphere
 from facegen.errors import InputError
 from facegen.geometry.camera import frame
 from facegen.geometry.mesh import Mesh, merge
-from facegen.render import Renderer, render
+from facegen.render import Renderer, render, render_passes
 from facegen.render.scene import Light, Scene
 
 GOLDEN = Path(__file__).parent / "golden"
@@ -195,12 +196,64 @@ def test_wide_tall_and_large_pictures():
     np.testing.assert_array_equal(np.diff(column), 1)
 
 
-def test_a_camera_inside_the_mesh_draws_without_trouble():
-    camera = frame(BALL.vertices * 0.2, size=(64, 64))
-    pixels = render(merge([BALL, sphere(radius=5, part="around")]), camera=camera)
-    assert pixels.shape == (64, 64, 4)
+def test_a_mesh_behind_the_camera_is_out_of_the_picture():
+    camera = frame(BALL.vertices, size=(64, 64))
     behind = BALL.with_vertices(BALL.vertices + np.array([0, 0, 1000]))
     assert (render(behind, camera=camera, background="transparent")[..., 3] == 0).all()
+
+
+@pytest.mark.parametrize("orthographic", [False, True])
+def test_a_camera_inside_the_head_is_said(orthographic):
+    camera = frame(BALL.vertices * 0.2, size=(64, 64), orthographic=orthographic)
+    around = merge([BALL, sphere(radius=5, part="around")])
+    for call in (lambda: render(around, camera=camera), lambda: Renderer(around, camera=camera),
+                 lambda: render_passes(around, camera=camera)):
+        with pytest.raises(InputError, match=r"^camera: the camera stands inside the mesh .*move the camera away"):
+            call()
+    drawn = Renderer(BALL, size=64)
+    with pytest.raises(InputError, match=r"^pose: the camera stands inside the mesh"):
+        drawn.draw(BALL.vertices * 40)
+    with pytest.raises(InputError, match=r"^pose: the camera stands inside the mesh"):
+        render(BALL, BALL.vertices * 40, size=64)
+
+
+def with_isolated(place):
+    return Mesh(np.append(BALL.vertices, [place], axis=0), BALL.faces, BALL.materials, BALL.face_materials, BALL.parts,
+                BALL.face_parts)
+
+
+def test_isolated_vertices_and_triangles_without_area_are_drawn_as_nothing():
+    camera = frame(BALL.vertices, size=(64, 64))
+    expected = render(BALL, camera=camera)
+    inside = with_isolated((0, 0, 0))
+    np.testing.assert_array_equal(render(inside, camera=camera), expected)
+    # Behind the camera it is no cause for alarm either.
+    np.testing.assert_array_equal(render(with_isolated((0, 0, 50)), camera=camera, occlusion="off"),
+                                  render(BALL, camera=camera, occlusion="off"))
+    flat = Mesh(BALL.vertices, np.concatenate([BALL.faces, [[0, 0, 0], [3, 9, 9], [5, 5, 7]]]), BALL.materials,
+                np.append(BALL.face_materials, [0, 0, 0]), BALL.parts, np.append(BALL.face_parts, [0, 0, 0]))
+    np.testing.assert_array_equal(render(flat, camera=camera, wireframe=True, shadows=True),
+                                  render(BALL, camera=camera, wireframe=True, shadows=True))
+
+
+@pytest.mark.parametrize("size", [32, (32, 4096), (4096, 32)])
+@pytest.mark.parametrize("orthographic", [False, True])
+def test_the_smallest_and_the_longest_pictures(size, orthographic):
+    pixels = render(BALL, size=size, orthographic=orthographic, occlusion="off", background="transparent")
+    width, height = size if isinstance(size, tuple) else (size, size)
+    assert pixels.shape == (height, width, 4)
+    assert pixels[height // 2, width // 2, 3] == 255
+    assert pixels[0, 0, 3] == 0
+
+
+def test_the_largest_picture():
+    pytest.importorskip("numba")                                    # NumPy alone takes some seconds
+    triangle = np.array([[-1, -1, 0], [1, -1, 0], [0, 1, 0]], float)
+    camera = frame(triangle, size=(4096, 4096))
+    small = Mesh.of(triangle / 10, [[0, 1, 2]])                     # few pixels: quick, and yet the whole buffer
+    alpha = render(small, camera=camera, background="transparent", occlusion="off", renderer="fast")[..., 3]
+    assert alpha.shape == (4096, 4096)
+    assert (alpha == 255).mean() == pytest.approx(0.084**2 / 2, rel=0.02)
 
 
 def nan_ball():
@@ -232,6 +285,18 @@ def nan_ball():
     (lambda: render(nan_ball()), r"^thing: expected finite vertices, vertex 7 "),
     (lambda: render(Mesh.of(np.zeros((3, 3)), np.zeros((0, 3), int))), r"^thing: .*no triangles"),
     (lambda: render("happiness"), r"^thing: expected a Mesh or a face, got str"),
+    (lambda: render(with_isolated((0, np.nan, 0))),
+     r"^thing: expected finite vertices, vertex 1106 is \[0\.0, nan, 0\.0\]"),
+    (lambda: render(BALL, size=0), r"^size: .*got 0"),
+    (lambda: render(BALL, size=(100000, 100000)), r"^size: .*got \(100000, 100000\)"),
+    (lambda: render(BALL, camera=frame(BALL.vertices, size=(16, 64))), r"^camera: expected pixels .*got \(16, 64\)"),
+    (lambda: render(BALL, camera=frame(BALL.vertices, size=(64, 5000))), r"^camera: .*32\.\.4096"),
+    (lambda: render(BALL, camera="front"), r"^camera: expected a facegen\.geometry\.camera\.Camera or None, got str"),
+    (lambda: render(BALL, camera=replace(frame(BALL.vertices, size=(64, 64)), scale=0)), r"^camera: .*a scale above 0"),
+    (lambda: render(BALL.with_vertices(np.ones_like(BALL.vertices))), r"^thing: all triangles lie in one point"),
+    (lambda: render(BALL, np.ones_like(BALL.vertices)), r"^pose: all triangles lie in one point"),
+    (lambda: render(BALL, renderer="sotf"), r"^renderer: .*did you mean 'soft'"),
+    (lambda: render(BALL, shadows="yes"), r"^shadows: expected True or False, got 'yes'"),
     (lambda: render(BallRig(), detail=4), r"^detail: expected a subdivision level"),
 ])
 def test_wrong_arguments_are_named_at_the_door(call, message):
