@@ -10,6 +10,8 @@ from concurrent.futures import BrokenExecutor, Executor, Future, ProcessPoolExec
 from contextlib import contextmanager
 from typing import Any, Protocol
 
+from facegen.render.request import available_cores
+
 _MOST_PROCESSES = 61        # Windows cannot wait for more
 # Libraries that start a thread for every core: in a worker they would fight for the cores of all others.
 _THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS",
