@@ -1,30 +1,26 @@
-"""Make the frames of a smile that grows and fades, all at once, as one array.
-
-python examples/05_animation_frames.py [folder]
-"""
+"""A clip: keyframes, events and an idle layer; its weights over time, its frames, and a film."""
 
 import sys
 from pathlib import Path
 
-import numpy as np
-
 import facegen
 
 folder = Path(sys.argv[1] if len(sys.argv) > 1 else ".")
-face = facegen.load_face()
 
-# Weights over time: half a second up, half a second held, half a second down, at 20 frames a second.
-rise = np.sin(np.linspace(0, np.pi / 2, 10)) ** 2
-amount = np.concatenate([rise, np.ones(10), rise[::-1]])
+# A smile that comes in half a second, with a blink and a glance on the way. docs/clips.md explains the keys;
+# facegen.load_clip reads the same from a YAML file, such as greeting.yaml beside this program.
+clip = facegen.load_clip({
+    "keyframes": [{"t": 0.0, "pose": "neutral"}, {"t": 0.5, "pose": "happiness"}, {"t": 1.5, "pose": "happiness"}],
+    "events": [{"at": 0.7, "kind": "blink"},
+               {"at": 0.9, "eyes": {"yaw": 12}, "onset": 0.05, "apex": 0.3, "offset": 0.05}],
+}, idle=7)
+print("seconds, frames:", clip.duration, clip.frames(20))
+print("weights at 0.25 s:", {code: round(weight, 2) for code, weight in clip.units_at(0.25).items()})
 
-# The smile is linear in its data: scale the peak's controls, and pose the whole batch in one call.
-peak = face.controls(face.resolve("happiness").deformation)
-batch = facegen.Controls(**{
-    name: amount.reshape(-1, *[1] * value.ndim) * value for name, value in vars(peak).items()})
-frames = face.pose_controls(batch, detail=1)                             # (30, n, 3) millimetres
-print("frames, vertices, axes:", frames.shape)
+renderer = facegen.Renderer(facegen.load_face(), size=128, detail=1)
+frames = [renderer.draw(pose) for pose in clip.sample(20)]
+print(facegen.save_video(frames, folder / "clip.gif", fps=20))
 
-mesh = face.mesh(1)
-pictures = [facegen.render(mesh, vertices, size=128) for vertices in frames[::3]]
-sheet = facegen.contact_sheet(pictures, [f"{3 * i / 20:.2f} s" for i in range(len(pictures))], columns=5)
+chosen = range(0, len(frames), 3)
+sheet = facegen.contact_sheet([frames[k] for k in chosen], [f"{k / 20:.2f} s" for k in chosen], columns=5)
 print(facegen.save_image(sheet, folder / "frames.png"))

@@ -17,6 +17,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from facegen.animation.clip import Clip
+    from facegen.animation.script import load_clip, morph
     from facegen.errors import FacegenError, FileError, InputError, JobError, NotationError, TableError
     from facegen.face.face import Controls, Face, face_names, load_face
     from facegen.facs.deformation import Deformation, load_deformation
@@ -25,13 +27,16 @@ if TYPE_CHECKING:
     from facegen.facs.notation import canonical, parse
     from facegen.facs.tables import load_expressions, load_person, load_units
     from facegen.fileio.images import contact_sheet, save_image
+    from facegen.fileio.video import save_video
     from facegen.geometry.mesh import Mesh
     from facegen.jobs.batch import run_batch
+    from facegen.jobs.frames import save_clip, save_turn
     from facegen.render import Renderer, Wireframe, render, render_passes, save_passes
 
 __version__ = "0.1.0"
 
 __all__ = [
+    "Clip",
     "Controls",
     "Deformation",
     "Face",
@@ -48,11 +53,13 @@ __all__ = [
     "canonical",
     "contact_sheet",
     "face_names",
+    "load_clip",
     "load_deformation",
     "load_expressions",
     "load_face",
     "load_person",
     "load_units",
+    "morph",
     "parse",
     "people",
     "presets",
@@ -60,12 +67,17 @@ __all__ = [
     "render_passes",
     "resolve",
     "run_batch",
+    "save_clip",
     "save_image",
     "save_passes",
+    "save_turn",
+    "save_video",
 ]
 
 # Where each name lives. Read on first use (PEP 562), so that `import facegen` costs nothing.
 _HOMES = {
+    "facegen.animation.clip": ("Clip",),
+    "facegen.animation.script": ("load_clip", "morph"),
     "facegen.errors": ("FacegenError", "FileError", "InputError", "JobError", "NotationError", "TableError"),
     "facegen.face.face": ("Controls", "Face", "face_names", "load_face"),
     "facegen.facs.deformation": ("Deformation", "load_deformation"),
@@ -74,8 +86,10 @@ _HOMES = {
     "facegen.facs.notation": ("canonical", "parse"),
     "facegen.facs.tables": ("load_expressions", "load_person", "load_units"),
     "facegen.fileio.images": ("contact_sheet", "save_image"),
+    "facegen.fileio.video": ("save_video",),
     "facegen.geometry.mesh": ("Mesh",),
     "facegen.jobs.batch": ("run_batch",),
+    "facegen.jobs.frames": ("save_clip", "save_turn"),
     "facegen.render.overlay": ("Wireframe",),
     "facegen.render.passes": ("render_passes",),
     "facegen.render.passfiles": ("save_passes",),

@@ -10,10 +10,11 @@ from typing import Annotated
 import typer
 
 from facegen import __version__
-from facegen.cli import batch, explain, figures, gallery, listing, picture
+from facegen.cli import batch, explain, figures, film, gallery, listing, picture
 from facegen.errors import FacegenError, InputError
 
 DONE, STOPPED, WRONG = 0, 1, 2
+_INTERRUPTED = 130      # what typer makes of Ctrl-C
 
 # The errors of a command line (an unknown option, a missing argument): typer exports only their child.
 _CommandLineError = typer.BadParameter.__mro__[2]
@@ -26,6 +27,9 @@ app.command("explain")(explain.explain)
 app.command("gallery")(gallery.gallery)
 app.command("batch")(batch.batch)
 app.command("figures")(figures.figures)
+app.command("animate")(film.animate)
+app.command("morph")(film.morph)
+app.command("turntable")(film.turntable)
 
 
 def _version(asked: bool) -> None:
@@ -56,6 +60,8 @@ def run(argv: Sequence[str] | None = None) -> int:
     try:
         code = app(args=None if argv is None else list(argv), prog_name="facegen", standalone_mode=False)
         sys.stdout.flush()
+        if code == _INTERRUPTED:
+            return _say("stopped", STOPPED)
         return code if isinstance(code, int) else DONE
     except FacegenError as error:
         return _say(str(error), WRONG if isinstance(error, InputError) else STOPPED)

@@ -9,7 +9,7 @@ from typing import Annotated, Any
 import typer
 
 from facegen.cli.options import Json, Quiet, print_json, progress
-from facegen.errors import InputError
+from facegen.errors import InputError, JobError
 
 Jobs = Annotated[Path | None, typer.Argument(metavar="[JOBS]", help="A jobs file, YAML or JSON; or say it by options.")]
 Out = Annotated[Path | None, typer.Option("--output", "-o", metavar="DIR", help="Folder of the data set. [required]")]
@@ -67,8 +67,11 @@ def batch(jobs: Jobs = None, output: Out = None, poses: Poses = None, views: Vie
     if not quiet:
         for warning in work.warnings:
             print(f"facegen: warning: {warning}", file=sys.stderr)
-    with progress("pictures", len(work.pictures), quiet=quiet) as step:
-        done = run_batch(work, output, workers=workers, scheduler=scheduler, update=update, step=step)
+    try:
+        with progress("pictures", len(work.pictures), quiet=quiet) as step:
+            done = run_batch(work, output, workers=workers, scheduler=scheduler, update=update, step=step)
+    except KeyboardInterrupt:
+        raise JobError("stopped; the finished pictures stay: run the same again to go on") from None
     if json:
         print_json({"folder": str(output), "manifest": str(output / done.manifest.name),
                     "pictures": len(work.pictures), "made": done.made, "kept": done.kept, "removed": done.removed,

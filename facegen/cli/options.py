@@ -62,24 +62,20 @@ def _option(parse: Callable[[str], Any], text: str) -> Any:
         raise InputError(f"--{error}") from error
 
 
-def full_name(what: str) -> str:
-    """Return a preset's full name for its unmistakable end: figure-8 for akimoto-1986-figure-8."""
-    from facegen.facs.expressions import presets
-
-    word = "-".join(what.split()).replace("_", "-").casefold()
-    found = [name for name in presets() if name.endswith(f"-{word}") and not word.isdigit()]
-    return found[0] if len(found) == 1 else what
-
-
 def read_what(what: str, *, person: str | None, intensity: float, quiet: bool) -> Resolution:
     """Return what a command's WHAT means; warnings go to stderr."""
-    from facegen.facs.expressions import resolve
+    from facegen.facs.expressions import full_name, resolve
 
     resolution = resolve(full_name(what), person=person, intensity=intensity)
     if not quiet:
-        for warning in resolution.warnings:
-            print(f"facegen: warning: {warning}", file=sys.stderr)
+        warn(resolution.warnings)
     return resolution
+
+
+def warn(warnings: Iterable[str]) -> None:
+    """Print warnings on stderr."""
+    for warning in warnings:
+        print(f"facegen: warning: {warning}", file=sys.stderr)
 
 
 def print_json(data: Any) -> None:

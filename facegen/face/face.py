@@ -7,7 +7,7 @@ no code. A face is a rig: ``pose(what)`` gives vertices, ``mesh(detail)`` what t
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache, cached_property
 from pathlib import Path
 from typing import Any
@@ -24,7 +24,7 @@ from facegen.face.eye import eyeball_radius
 from facegen.face.folds import fold_field
 from facegen.face.landmarks import landmark_weights
 from facegen.face.loader import FaceData, read_face
-from facegen.facs.deformation import Deformation
+from facegen.facs.deformation import Deformation, weighted_sum
 from facegen.facs.expressions import Resolution, resolve
 from facegen.geometry.mesh import Mesh, merge
 from facegen.geometry.normals import vertex_normals
@@ -144,7 +144,9 @@ class Face:
         cannot be understood.
         """
         found = self.resolve(what, person=person, intensity=intensity)
-        return self.pose_controls(self.controls(found.deformation, strict=not found.units), detail=detail)
+        whole = weighted_sum([(1.0, self._in_millimetres(one)) for one in (found.deformation, *found.more)]) \
+            if found.more else found.deformation
+        return self.pose_controls(self.controls(whole, strict=not found.units), detail=detail)
 
     def resolve(self, what: Any, *, person: Any = None, intensity: float = 1.0) -> Resolution:
         """Return the chain name -> units -> deformation data (Akimoto 1986, fig. 10).
@@ -162,14 +164,7 @@ class Face:
         ``strict=False`` it is passed over: a face of fifteen points takes of the common tables what it can.
         """
         d = self._data
-        units = deformation.units
-        if units == "face":
-            scale, mouth = d.point_scale, d.scales["mouth"]
-        elif units == "millimetre":
-            scale, mouth = np.ones((len(d.point_names), 3)), np.ones(3)
-        else:                                              # the paper's: half head heights, z backward
-            scale = np.tile(d.head_half_height * np.array([1.0, 1.0, -1.0]), (len(d.point_names), 1))
-            mouth = scale[0]
+        scale, mouth = self._lengths(deformation.units)
         vectors = np.zeros((len(d.point_names), 3))
         for name, vector in deformation.points.items():
             row = self._point(name, strict)
@@ -219,6 +214,28 @@ class Face:
             pieces.append(a.move(moved_cage, controls, self.deformer))
         vertices = np.concatenate(pieces, axis=-2)
         return self._turn_head(vertices, controls.head, level.head_weight)
+
+    def _lengths(self, units: str) -> tuple[Array, Array]:
+        """Return the millimetres of a unit of length: at each feature point (k, 3), and of the jaw and head (3,)."""
+        d = self._data
+        if units == "face":
+            return d.point_scale, d.scales["mouth"]
+        if units == "millimetre":
+            return np.ones((len(d.point_names), 3)), np.ones(3)
+        paper = d.head_half_height * np.array([1.0, 1.0, -1.0])     # half head heights, z backward
+        return np.tile(paper, (len(d.point_names), 1)), paper
+
+    def _in_millimetres(self, deformation: Deformation) -> Deformation:
+        """Return the same movements of this face in millimetres; what this face lacks keeps its numbers."""
+        scale, mouth = self._lengths(deformation.units)
+        rows = self._data.point_index
+        points = {name: tuple(np.asarray(vector) * scale[rows[name]]) if name in rows else vector
+                  for name, vector in deformation.points.items()}
+        jaw, head = dict(deformation.jaw), dict(deformation.head)
+        for part, key, axis in ((jaw, "side", 0), (jaw, "forward", 2), (head, "forward", 2)):
+            if key in part:
+                part[key] *= mouth[axis]
+        return replace(deformation, points=points, jaw=jaw, head=head, units="millimetre")
 
     def _point(self, name: str, strict: bool) -> int | None:
         """Return the row of a feature point that takes input, or None for one to be passed over."""

@@ -35,7 +35,8 @@ class Resolution:
 
     name: for a caption - the expression's name, the canonical script, or the file's stem. expression: the
     table's entry, if a name led here. units: code -> weight, intensity applied, combinations not yet; empty
-    for raw data. source: where the recipe or data come from, as far as known.
+    for raw data. source: where the recipe or data come from, as far as known. more: further movements, in other units
+    of length than ``deformation``, which only a face can add to it.
     """
 
     what: object
@@ -46,11 +47,19 @@ class Resolution:
     deformation: Deformation
     warnings: tuple[str, ...] = ()
     source: str | None = None
+    more: tuple[Deformation, ...] = ()
 
 
 def presets() -> tuple[str, ...]:
     """Return the names of the shipped raw deformations."""
     return tuple(sorted(path.stem for path in (tables_dir() / "presets").glob("*.yaml")))
+
+
+def full_name(what: str) -> str:
+    """Return a preset's full name for its unmistakable end: figure-8 for akimoto-1986-figure-8."""
+    word = "-".join(what.split()).replace("_", "-").casefold()
+    found = [name for name in presets() if name.endswith(f"-{word}") and not word.isdigit()]
+    return found[0] if len(found) == 1 else what
 
 
 def resolve(what: What, *, person: str | Path | Person | None = None, intensity: float = 1.0,

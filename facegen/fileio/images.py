@@ -31,13 +31,13 @@ def save_image(pixels: ArrayLike, path: str | os.PathLike[str]) -> Path:
     transparency and gets white behind. A fully opaque alpha is dropped. Raises InputError for the pixels,
     FileError for the path.
     """
-    pixels = _checked(pixels)
+    pixels = check_pixels(pixels)
     path = check_image_path(path)
     kind, settings = _FORMATS[path.suffix.lower()]
     if pixels.shape[2] == 4 and (pixels[..., 3] == 255).all():
         pixels = np.ascontiguousarray(pixels[..., :3])
     elif pixels.shape[2] == 4 and kind == "JPEG":
-        pixels = _over(pixels, _PAPER)
+        pixels = over_colour(pixels, _PAPER)
 
     from PIL import Image  # lazy: most of facegen works without it
 
@@ -86,7 +86,7 @@ def contact_sheet(images: Sequence[ArrayLike], labels: Sequence[str], columns: i
     images: (h, w, 3) or (h, w, 4) uint8, all of one height and width. labels: one each; a label wider than
     its picture is set smaller, then cut. gap: pixels between pictures.
     """
-    pictures = [_checked(image) for image in images]
+    pictures = [check_pixels(image) for image in images]
     if not pictures or len(pictures) != len(labels):
         raise InputError(f"labels: expected one for each picture and at least one picture, "
                          f"got {len(pictures)} pictures and {len(labels)} labels")
@@ -107,7 +107,7 @@ def contact_sheet(images: Sequence[ArrayLike], labels: Sequence[str], columns: i
     draw = ImageDraw.Draw(sheet)
     for k, (picture, label) in enumerate(zip(pictures, labels, strict=True)):
         left, top = gap + (k % columns) * (width + gap), gap + (k // columns) * (height + strip + gap)
-        sheet.paste(Image.fromarray(_over(picture, _PAPER)), (left, top))
+        sheet.paste(Image.fromarray(over_colour(picture, _PAPER)), (left, top))
         text, font = _fitted(str(label), letters, width)
         draw.text((left + width / 2, top + height + strip / 2), text, fill=_INK, font=font, anchor="mm")
     return np.asarray(sheet).copy()
@@ -126,7 +126,8 @@ def _fitted(text: str, letters: int, width: int):
     return text + "…", font
 
 
-def _checked(pixels: ArrayLike) -> NDArray[np.uint8]:
+def check_pixels(pixels: ArrayLike) -> NDArray[np.uint8]:
+    """Return a picture (h, w, 3) or (h, w, 4) uint8, contiguous, or raise InputError."""
     pixels = np.asarray(pixels)
     if pixels.dtype != np.uint8 or pixels.ndim != 3 or pixels.shape[2] not in (3, 4) or 0 in pixels.shape:
         raise InputError("pixels: expected a picture of shape (h, w, 3) or (h, w, 4) and type uint8, "
@@ -134,7 +135,7 @@ def _checked(pixels: ArrayLike) -> NDArray[np.uint8]:
     return np.ascontiguousarray(pixels)
 
 
-def _over(pixels: NDArray[np.uint8], behind: tuple[int, int, int]) -> NDArray[np.uint8]:
+def over_colour(pixels: NDArray[np.uint8], behind: tuple[int, int, int]) -> NDArray[np.uint8]:
     """Return a picture (h, w, 3) over a plain colour."""
     if pixels.shape[2] == 3:
         return pixels

@@ -101,8 +101,8 @@ def _check_folder(root: Path, mark: Mapping[str, Any], *, update: bool) -> bool:
         raise FileError(f"{root}: cannot be read: {error.strerror or error}") from error
     if text is None:
         if inside:
-            raise FileError(f"{root}: holds other files ('{min(inside)}') and is no data set; take a folder that is new "
-                            "or empty")
+            raise FileError(f"{root}: holds other files ('{min(inside)}') and is no data set; take a folder that is "
+                            "new or empty")
         return False
     there = parse_json(text, str(root / MARK))
     same = isinstance(there, dict) and there.get("batch") == mark["batch"]

@@ -15,12 +15,13 @@ WAIT = 5.0
 _RECOUNT = 5.0      # seconds after which workers are counted again: they may join and leave while the work runs
 
 
-def connect(address: str, *, wait: float = WAIT) -> Cluster:
+def connect(address: str, *, wait: float | None = None) -> Cluster:
     """Return the workers of the dask scheduler at an address such as ``tcp://10.0.0.7:8786``.
 
-    Raises InputError if distributed is not installed, nothing answers there within ``wait`` seconds, or no worker is
-    there.
+    wait: seconds for the scheduler to answer, and for its first worker to come; None is `WAIT`. Raises InputError if
+    distributed is not installed, nothing answers, or no worker is there.
     """
+    wait = WAIT if wait is None else wait
     try:
         from distributed import Client
     except ImportError as error:

@@ -21,8 +21,8 @@ _COLUMNS = ("file", "mask", "name", "pose", "units", "person", "intensity", "fac
             "height", "yaw", "pitch")
 _ABOUT = {
     "axes": "world: millimetres, +x the subject's left, +y up, +z forward; left and right are the subject's",
-    "camera": "extrinsics: 3x4, world to camera, [R | t] @ (x, y, z, 1); camera axes: x to the picture's right, y down, "
-              "z away from the viewer. intrinsics: 3x3, K @ (X/Z, Y/Z, 1) is in pixels; where projection is "
+    "camera": "extrinsics: 3x4, world to camera, [R | t] @ (x, y, z, 1); camera axes: x to the picture's right, "
+              "y down, z away from the viewer. intrinsics: 3x3, K @ (X/Z, Y/Z, 1) is in pixels; where projection is "
               "orthographic, K @ (X, Y, 1)",
     "pixels": "x to the right, y down; the centre of the first pixel is (0.5, 0.5)",
     "view": "yaw and pitch of the camera round the head, degrees; positive yaw goes to the subject's left, pitch up",

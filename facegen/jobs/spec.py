@@ -17,7 +17,7 @@ from typing import Any
 from facegen.errors import FacegenError, InputError, TableError
 from facegen.face.face import face_names, load_face
 from facegen.facs.expression_table import is_path
-from facegen.facs.expressions import Resolution, resolve
+from facegen.facs.expressions import Resolution, full_name, resolve
 from facegen.facs.units import load_catalogue
 from facegen.facs.validate import Entry
 from facegen.facs.yamlfile import read_data
@@ -213,8 +213,7 @@ class _Reader:
     # -- members ------------------------------------------------------------------------------------------------
     def _members(self, entry: Entry, key: str) -> list[tuple[Any, Entry]]:
         """Return the members of a list, each with its entry; one alone may stand without brackets."""
-        alone = not isinstance(entry.value, (list, tuple)) or (key == "views" and _is_pair(entry.value))
-        entries = [entry] if alone else entry.each()
+        entries = entry.each() if isinstance(entry.value, (list, tuple)) else [entry]
         if not entries:
             raise entry.fail("expected one member or more, got an empty list: there would be no pictures")
         return [(self._value(LISTS[key], one), one) for one in entries]
@@ -225,7 +224,7 @@ class _Reader:
         if key == "pose":
             if not isinstance(value, (str, int, Mapping)) or isinstance(value, bool):
                 raise entry.wrong("an expression, a FACS script, a file, or a mapping of units or movements")
-            return value if isinstance(value, Mapping) else self._at_home(str(value))
+            return value if isinstance(value, Mapping) else self._at_home(full_name(str(value)))
         if key == "person":
             nobody = value is None or (isinstance(value, str) and value.strip().casefold() in _NOBODY)
             return None if nobody else self._at_home(entry.text())
@@ -308,10 +307,6 @@ def _some_units(units: tuple[dict[str, tuple[float, float]], tuple[int, int]], d
         low, high = ranges[code]
         chosen[code] = round(low + dice.random() * (high - low), 3)
     return {code: chosen[code] for code in ranges if code in chosen}
-
-
-def _is_pair(value: Any) -> bool:
-    return len(value) == 2 and all(isinstance(x, (int, float)) for x in value)
 
 
 def _frozen(value: Any) -> Any:

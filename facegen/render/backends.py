@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from facegen.errors import InputError
-from facegen.geometry.camera import Camera
+from facegen.geometry.camera import Camera, frame
 from facegen.geometry.mesh import Mesh
 from facegen.render.request import Look, check_choice
 from facegen.render.scene import Scene
@@ -35,25 +35,33 @@ _HOMES = {
 _NEEDS = {"fast": "numba"}
 
 RENDERERS = ("auto", *_HOMES)
-# A single picture of fewer pixels is finished by NumPy before the compiled renderer has been loaded.
-_WORTH_LOADING = 1500 * 1500
+# Fewer pixels than these, in all pictures together, are drawn by NumPy before the compiled renderer has been compiled.
+_WORTH_COMPILING = 6e6
 
 
-def choose(renderer: str, *, once: bool = False, pixels: int = 0) -> str:
+def choose(renderer: str, *, pictures: int | None = None, pixels: int = 0) -> str:
     """Return the name of the renderer to use; InputError for one that is unknown or whose package is missing.
 
-    "auto" is the compiled renderer where numba is installed. For a single picture (``once``) it must be worth its
-    start too: loaded already, or the picture large.
+    "auto" is the compiled renderer where numba is installed and ``pictures`` of so many ``pixels`` are worth its
+    start; None is an unknown, large number. Whether it was compiled before does not count: a film that goes on after
+    a stop must choose again as it did.
     """
     check_choice("renderer", renderer, RENDERERS)
     if renderer == "auto":
-        loaded = _HOMES["fast"][0] in sys.modules
-        worth = loaded or not once or pixels >= _WORTH_LOADING
-        return "fast" if worth and find_spec("numba") else "soft"
+        worth = pictures is None or pictures * pixels >= _WORTH_COMPILING
+        loaded = pictures == 1 and _HOMES["fast"][0] in sys.modules
+        return "fast" if (worth or loaded) and find_spec("numba") else "soft"
     if renderer in _NEEDS and find_spec(_NEEDS[renderer]) is None:
         raise InputError(f"renderer: {renderer!r} needs the package {_NEEDS[renderer]}, which is not installed: "
                          f'pip install "facegen[{renderer}]", or leave renderer out')
     return renderer
+
+
+def warm(name: str) -> None:
+    """Have a renderer compiled, which happens once on a machine: before several processes do it at the same time."""
+    if name == "fast":
+        triangle = Mesh.of(np.eye(3), [[0, 1, 2]])
+        load(name)(triangle, frame(triangle.vertices, size=(32, 32)), Scene(), Look()).draw(triangle.vertices)
 
 
 def load(name: str) -> Callable[[Mesh, Camera, Scene, Look], Backend]:

@@ -73,11 +73,11 @@ class FastBackend:
         self._scratch = [(np.empty((m, 16), np.float32), np.empty(m, np.uint8)) for _ in range(self._threads)]
         self._light = np.ones((n, 1 + lights), np.float32)
         if look.occlusion == "neutral":
-            self._light = self._baked(neutral.vertices)
+            self._light = self._baked(_own(neutral.vertices))
 
     def draw(self, vertices: NDArray[np.float64]) -> NDArray[np.uint8]:
         """Return the picture (h, w, 4) of checked vertices (n, 3)."""
-        vertices = np.ascontiguousarray(vertices, np.float64)
+        vertices = _own(vertices)
         width, height = self.camera.width, self.camera.height
         kernels.project(vertices, self._cam, self._proj, self._snapped, self._depth)
         items = kernels.bin_triangles(self._faces, self._snapped, self._depth, width, height,
@@ -123,6 +123,11 @@ class FastBackend:
             work(0)
         else:
             list(_pool(self._threads).map(work, range(self._threads)))
+
+
+def _own(vertices: NDArray) -> NDArray[np.float64]:
+    """Return a copy: a read-only array would be another type to the compiler, and all be compiled twice."""
+    return np.array(vertices, np.float64, order="C")
 
 
 @cache

@@ -117,8 +117,9 @@ def test_auto_takes_the_compiled_one_where_it_pays(monkeypatch):
 
     assert choose("auto") == "fast"
     monkeypatch.delitem(sys.modules, "facegen.render.fast", raising=False)
-    assert choose("auto", once=True, pixels=512 * 512) == "soft"
-    assert choose("auto", once=True, pixels=4096 * 4096) == "fast"
+    assert choose("auto", pictures=1, pixels=512 * 512) == "soft"
+    assert choose("auto", pictures=100, pixels=512 * 512) == "fast"
+    assert choose("auto", pictures=1, pixels=4096 * 4096) == "fast"
     assert choose("soft") == "soft"
 
 

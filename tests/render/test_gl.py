@@ -114,8 +114,9 @@ def test_inner_sides_unknown_materials_and_other_lights():
 @pytest.mark.parametrize("occlusion", ["posed", "neutral", "off"])
 def test_shadows_are_those_of_the_other_renderers(face, occlusion):
     soft, card = (shadow_change(face, name, occlusion) for name in ("soft", "gl"))
-    assert (np.abs(soft - card).max(axis=2) > 2).mean() <= 0.002
-    assert (np.abs(soft).max(axis=2) > 2).mean() > 0.02
+    assert np.abs(soft).max() > 25
+    assert np.abs(soft - card).max() <= 10                       # beside edges, where the samples lie elsewhere
+    assert np.abs(soft - card).mean() < 0.15 * np.abs(soft).mean()
 
 
 def test_a_camera_inside_the_mesh_draws_without_trouble():
