@@ -15,7 +15,7 @@ from contextlib import ExitStack
 from pathlib import Path
 
 from facegen.jobs.batch import run_batch
-from facegen.jobs.crew import available_cores
+from facegen.render.request import available_cores
 
 
 def measure(jobs: dict, **how) -> tuple[float, float]:

@@ -146,7 +146,7 @@ def _target(output: Path | None) -> Path:
 
 
 def _count(workers: int | None) -> int:
-    from facegen.jobs.crew import available_cores
+    from facegen.render.request import available_cores
 
     return workers or available_cores()
 

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Callable, Mapping
 from concurrent.futures import Executor
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +21,7 @@ from facegen.jobs.naming import file_names
 from facegen.jobs.picture import IMAGES, LABELS, MASKS, PictureTask, picture_tasks
 from facegen.jobs.runner import run
 from facegen.jobs.spec import FORMATS, Batch, read_batch
+from facegen.render.backends import choose, warm
 
 MARK = "batch.json"
 """Tells whose folder it is, from the first moment on."""
@@ -58,6 +60,10 @@ def run_batch(jobs: str | Path | Mapping[str, Any] | Batch, folder: str | Path, 
     if scheduler is not None and (executor is not None or workers is not None):
         raise InputError("scheduler: give either a scheduler or an executor or workers")
     batch = jobs if isinstance(jobs, Batch) else read_batch(jobs)
+    pixels = max((math.prod(p.size) for p in batch.pictures), default=0)
+    # Settled here, not by each worker: their pictures must not differ.
+    chosen = choose(batch.settings.renderer, pictures=len(batch.pictures), pixels=pixels)
+    batch = replace(batch, settings=replace(batch.settings, renderer=chosen))
     root = Path(folder).absolute()
     names = file_names(batch.pictures)
     alone = executor is None and scheduler is None and workers == 1
@@ -81,6 +87,8 @@ def run_batch(jobs: str | Path | Mapping[str, Any] | Batch, folder: str | Path, 
             executor.close()
         raise
     try:
+        if not alone:
+            warm(chosen)
         report = run(tasks, executor=executor, workers=workers, step=step)
     finally:
         remove_drafts(root / file for task in tasks for file in (task.file, task.mask) if file)

@@ -43,13 +43,6 @@ class Crew(Protocol):
         """Wait for the workers and let go of them."""
 
 
-def available_cores() -> int:
-    """Return how many cores this process may use: fewer than the machine has, in a container for example."""
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
-
-
 class GivenExecutor:
     """Any executor, which stays its owner's."""
 

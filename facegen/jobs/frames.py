@@ -33,7 +33,7 @@ from facegen.fileio.textfile import make_folder, save_text, whole_file
 from facegen.fileio.video import check_film, save_video
 from facegen.geometry.camera import Camera, check_view, frame
 from facegen.jobs.runner import Report, run, shared
-from facegen.render.backends import choose
+from facegen.render.backends import choose, warm
 from facegen.render.render import Renderer
 from facegen.render.request import check_look, check_size, neutral_mesh
 
@@ -227,6 +227,8 @@ class _Target:
         self._open(shot)
         paths = [self.folder / f"frame_{k:05d}.png" for k in range(1, shot.frames + 1)]
         tasks = [FrameTask(shot, k, path, shot.fingerprint) for k, path in enumerate(paths)]
+        if workers > 1:
+            warm(shot.renderer)
         report = run(tasks, workers=workers, step=step)
         if self.is_film:
             save_video(_Frames(paths), self.path, fps=self.fps)

@@ -23,7 +23,8 @@ from typing import Any, Protocol, TypeVar
 
 from facegen.errors import FacegenError, InputError, JobError
 from facegen.fileio.textfile import remove_drafts
-from facegen.jobs.crew import Crew, GivenExecutor, LocalProcesses, available_cores, stopping
+from facegen.jobs.crew import Crew, GivenExecutor, LocalProcesses, stopping
+from facegen.render.request import available_cores
 
 LARGEST_CHUNK = 16
 CHUNKS_A_WORKER = 8     # each gets this many at least, so that none waits long for the last one

@@ -71,7 +71,7 @@ class Settings:
 
     format: str = "png"
     detail: int | None = None
-    renderer: str = "soft"
+    renderer: str = "auto"
     orthographic: bool = False
     masks: bool = False
     feature_points: bool = False
@@ -148,8 +148,8 @@ class _Reader:
             if key in fields:
                 asked[key] = fields[key].flag()
         name = fields["renderer"].choice(RENDERERS, "renderer") if "renderer" in fields else "auto"
-        # The one that is taken is settled here, not by each worker: their pictures must not differ.
-        asked["renderer"] = self._checked(fields.get("renderer"), lambda: choose(name))
+        self._checked(fields.get("renderer"), lambda: choose(name))
+        asked["renderer"] = name
         return Settings(**asked)
 
     # -- sections -----------------------------------------------------------------------------------------------

@@ -23,7 +23,7 @@ from facegen.render.occlusion import (
     light_lobes,
     sequence,
 )
-from facegen.render.request import Look
+from facegen.render.request import Look, available_cores
 from facegen.render.scene import Scene
 from facegen.render.shading import CAVITY, DARKEST, light_directions, material_rows, srgb_table, to_srgb, unit
 from facegen.render.shadow import with_shadows
@@ -154,5 +154,6 @@ def _pool(threads: int) -> ThreadPoolExecutor:
 
 
 def _cores() -> int:
-    """Return how many cores this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    """Return how many threads may draw: as many as there are cores, or as everybody is told to take."""
+    told = os.environ.get("OMP_NUM_THREADS", "")
+    return max(1, int(told)) if told.isdecimal() else available_cores()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol, runtime_checkable
@@ -155,6 +156,13 @@ def check_in_front(argument: str, vertices: NDArray, faces: NDArray, camera: Cam
         raise InputError(f"{argument}: the camera stands inside the mesh or too near to it: {behind} of {len(depth)} "
                          "vertices lie behind its near plane; move the camera away (a larger distance), or leave "
                          "camera out to have the head framed")
+
+
+def available_cores() -> int:
+    """Return how many cores this process may use: fewer than the machine has, in a container for example."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
 
 
 def check_finite(argument: str, vertices: NDArray) -> None:

@@ -26,7 +26,7 @@ class Write:
 
     def make(self) -> None:
         log = self.output.parent / "log"
-        prepared = shared(self.group, lambda: save_text("", log / f"prepared-{self.group}-{os.getpid()}"))
+        prepared = shared((str(log), self.group), lambda: save_text("", log / f"prepared-{self.group}-{os.getpid()}"))
         assert prepared.exists()
         save_text("", log / f"begun-{self.number}-{time.monotonic_ns()}")
         if self.kind == "slow":

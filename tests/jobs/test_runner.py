@@ -17,8 +17,9 @@ from tasks import begun, some, texts
 
 from facegen.errors import FileError, InputError, JobError
 from facegen.jobs import runner
-from facegen.jobs.crew import GivenExecutor, available_cores
+from facegen.jobs.crew import GivenExecutor
 from facegen.jobs.runner import Report, run, shared
+from facegen.render.request import available_cores
 
 ALL = {f"{i}.txt": f"{i}\n" for i in range(12)}
 

@@ -86,7 +86,8 @@ def test_names_are_readable_unique_and_safe():
     assert "pose-2_i50_bgff0000_y-30p+10" not in found      # the number comes last
     assert "pose_i50_bgff0000_y-30p+10-2" in found
     long = "+".join(f"{unit}=0.123" for unit in (1, 2, 4, 5, 6, 7, 9, 10, 12, 15, 17, 20, 23, 25, 26, 43))
-    own = [{"pose": "1", "name": name} for name in ("../../etc", "CON", "a b/c:d", "Ärger", "...", "x" * 300, "nul.tar")]
+    odd = ("../../etc", "CON", "a b/c:d", "Ärger", "...", "x" * 300, "nul.tar")
+    own = [{"pose": "1", "name": name} for name in odd]
     found = names({"poses": [long, long + "+45"], "pictures": own})
     assert found[2:] == ["etc", "pose_CON", "a_b_c_d", "Arger", "pose", "x" * LONGEST, "pose_nul.tar"]
     assert all(len(name) <= LONGEST + 8 and name.isascii() and "/" not in name for name in found)

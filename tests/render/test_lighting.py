@@ -39,7 +39,7 @@ def test_left_is_the_subjects():
 
 
 def test_an_unknown_light():
-    with pytest.raises(InputError, match="light: expected portrait, .*got 'lefft'; did you mean 'left'"):
+    with pytest.raises(InputError, match=r"light: expected portrait, .*got 'lefft'; did you mean 'left'"):
         load_light("lefft")
 
 

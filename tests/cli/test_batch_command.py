@@ -6,6 +6,8 @@ import json
 
 import pytest
 
+from facegen.errors import JobError
+
 
 def test_a_data_set_by_options(run, tmp_path):
     code, out, err = run("batch", "--poses", "happiness, 6C+12D", "--views", "0,0 30,0", "--sizes", "48x32",
@@ -14,7 +16,6 @@ def test_a_data_set_by_options(run, tmp_path):
                          "--workers", 1, "--json")
     assert (code, err) == (0, "")
     data = json.loads(out)
-    # 6C+12D is the same whoever makes it, but the label says who was asked for
     assert (data["pictures"], data["made"], data["kept"]) == (32, 32, 0)
     lines = [json.loads(line) for line in (tmp_path / "set" / "pictures.jsonl").read_text().splitlines()]
     assert {tuple(one["view"]) for one in lines} == {(0, 0), (30, 0)}
@@ -39,6 +40,26 @@ def test_a_jobs_file_and_then_another(run, tmp_path):
     code, out, err = run("batch", page, "-o", tmp_path / "set", "-q", "--update", "--json", "--workers", 1)
     assert (code, err) == (0, "")
     assert {key: json.loads(out)[key] for key in ("made", "kept", "removed")} == {"made": 0, "kept": 1, "removed": 1}
+
+
+@pytest.mark.parametrize(("raised", "words"), [
+    (KeyboardInterrupt(), "stopped; the finished pictures stay: run the same again to go on"),
+    (JobError("a.json: workers die over it"), "a.json: workers die over it"),
+])
+def test_work_that_ends_early_is_no_wrong_wish(run, tmp_path, monkeypatch, raised, words):
+    def fail(*_, **__):
+        raise raised
+
+    monkeypatch.setattr("facegen.jobs.batch.run_batch", fail)
+    assert run("batch", "--poses", "happiness", "-o", tmp_path / "set") == (1, "", f"facegen: {words}\n")
+
+
+def test_any_command_that_is_stopped_says_so(run, tmp_path, monkeypatch):
+    def stop(*_):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("facegen.face.face.load_face", stop)
+    assert run("gallery", "-o", tmp_path / "sheets") == (1, "", "facegen: stopped\n")
 
 
 @pytest.mark.parametrize(("argv", "words"), [
