@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from facegen.geometry.mesh import Mesh, merge
+from facegen.render import Renderer, render
 
 
 def sphere(material="skin", *, rings=24, radius=1.0, centre=(0, 0, 0), part="skin") -> Mesh:
@@ -51,3 +52,11 @@ def shuffled(mesh: Mesh, seed=0) -> Mesh:
     faces = np.take_along_axis(mesh.faces[order], (np.arange(3) + start) % 3, axis=1)
     return replace(mesh, faces=faces, face_materials=mesh.face_materials[order],
                    face_parts=mesh.face_parts[order])
+
+
+def shadow_change(face, renderer, occlusion):
+    """What shadows change in a picture; a renderer that is kept draws it, after another pose."""
+    options = {"size": 96, "detail": 1, "view": (20, 0), "occlusion": occlusion, "renderer": renderer}
+    drawn = Renderer(face, shadows=True, **options)
+    drawn.draw("surprise")
+    return drawn.draw("anger").astype(int) - render(face, "anger", **options)

@@ -12,6 +12,8 @@ from facegen import load_face
 from facegen.errors import InputError
 from facegen.geometry.mesh import Mesh, merge
 from facegen.render import Renderer, render
+from facegen.render.backends import load
+from facegen.render.request import Look
 from facegen.render.scene import Light, Scene
 
 SEVERAL = merge([sphere("sclera", rings=16, radius=0.5, centre=(-0.9, 0.6, 0.6)),
@@ -60,6 +62,14 @@ def test_random_triangles_are_covered_alike(seed, stretch):
     camera = Renderer(sphere(radius=2.0), size=(61, 83), renderer="soft").camera
     soft, fast = both(mesh, camera=camera, shading="flat", occlusion="off", background="transparent")
     assert np.array_equal(soft[..., 3], fast[..., 3])
+    assert different(soft, fast) <= 0.001
+
+
+def test_a_camera_before_half_of_the_mesh():
+    """The door turns such a camera away; the backends leave out what lies behind it alike."""
+    camera = replace(Renderer(SEVERAL, size=96).camera, distance=0.4)
+    soft, fast = (load(name)(SEVERAL, camera, Scene(), Look(occlusion="off")).draw(SEVERAL.vertices)
+                  for name in ("soft", "fast"))
     assert different(soft, fast) <= 0.001
 
 

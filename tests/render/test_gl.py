@@ -10,12 +10,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy.ndimage import gaussian_filter
-from shapes import box, sphere
+from shapes import box, shadow_change, sphere
 
 from facegen import load_face
 from facegen.errors import InputError
+from facegen.geometry.camera import frame
 from facegen.geometry.mesh import merge
 from facegen.render import Renderer, render
+from facegen.render.backends import load
+from facegen.render.request import Look
 from facegen.render.scene import Light, Scene
 
 SIMILAR = 0.99
@@ -106,6 +109,24 @@ def test_inner_sides_unknown_materials_and_other_lights():
     lights = tuple(Light((np.cos(k), np.sin(k), 1.0), (0.2, 0.15, 0.1), highlight=2.0) for k in range(gl.MAX_LIGHTS))
     for scene in (Scene(lights=()), Scene(lights=lights[:1]), Scene(lights=lights[:6]), Scene(lights=lights)):
         check_same(*pair(mesh, None, view=(20, 30), size=128, scene=scene))
+
+
+@pytest.mark.parametrize("occlusion", ["posed", "neutral", "off"])
+def test_shadows_are_those_of_the_other_renderers(face, occlusion):
+    soft, card = (shadow_change(face, name, occlusion) for name in ("soft", "gl"))
+    assert np.abs(soft).max() > 25
+    assert np.abs(soft - card).max() <= 10                       # beside edges, where the samples lie elsewhere
+    assert np.abs(soft - card).mean() < 0.15 * np.abs(soft).mean()
+
+
+def test_a_camera_inside_the_mesh_draws_without_trouble():
+    ball = sphere()
+    camera = frame(ball.vertices * 0.2, size=(64, 64))
+    around = merge([ball, sphere(radius=5, part="around")])                 # the door turns it away, the backend copes
+    pixels = load("gl")(around, camera, Scene(), Look()).draw(around.vertices)
+    assert len(np.unique(pixels.reshape(-1, 4), axis=0)) > 20
+    behind = ball.with_vertices(ball.vertices + np.array([0, 0, 1000]))
+    assert (render(behind, camera=camera, background="transparent", renderer="gl") == 0).all()
 
 
 def test_a_vertex_of_several_materials_is_uploaded_once_for_each(face):
