@@ -211,4 +211,4 @@ def test_a_renderer_that_is_not_installed(monkeypatch):
     monkeypatch.setattr("facegen.render.backends.find_spec", lambda name: None)
     with pytest.raises(TableError, match=r"jobs: renderer: .*facegen\[fast\]"):
         read_batch({"poses": "1", "renderer": "fast"})
-    assert read_batch({"poses": "1"}).settings.renderer == "auto"         # settled when it is known how much there is to do
+    assert read_batch({"poses": "1"}).settings.renderer == "auto"      # settled by the amount of work
