@@ -34,10 +34,9 @@ from facegen.geometry.camera import Camera
 from facegen.geometry.mesh import Mesh
 from facegen.geometry.normals import face_normals, vertex_normals
 from facegen.render.glsl import fragment_shader, vertex_shader
-from facegen.render.occlusion import light_shares, visibility
 from facegen.render.request import Look
 from facegen.render.scene import Scene
-from facegen.render.shading import light_directions, material_rows, to_srgb
+from facegen.render.shading import baked_light, material_rows, to_srgb
 from facegen.render.shadow import with_shadows
 from facegen.render.soft import background_rows
 
@@ -313,7 +312,7 @@ class GlBackend:
         self._still_light = np.ones((len(neutral.vertices), shares), np.float32)
         self._data[:, 6 + shares] = material
         if look.occlusion == "neutral":
-            self._still_light = self._light(neutral, vertex_normals(neutral.vertices, neutral.faces))
+            self._still_light = baked_light(neutral, vertex_normals(neutral.vertices, neutral.faces), camera, scene)
         self._own_light[:] = self._still_light[self._corners]
         self._behind = background_rows(look.background, scene, camera.height)
         materials = material_rows(neutral, scene)
@@ -369,16 +368,10 @@ class GlBackend:
             data[:, 3:6] = (smooth @ camera.rotation.T)[corners]
         if posed or self.look.shadows:
             mesh = self.neutral.with_vertices(vertices)
-            light = self._light(mesh, smooth) if posed else self._still_light
+            light = baked_light(mesh, smooth, camera, self.scene) if posed else self._still_light
             if self.look.shadows:
                 light = with_shadows(light, mesh, camera, self.scene)
             self._own_light[:] = light[corners]
-
-    def _light(self, mesh: Mesh, normals: NDArray) -> NDArray[np.float32]:
-        """Return the light shares (n, 1 + lights) of a mesh's vertices."""
-        spreads = np.array([lamp.spread for lamp in self.scene.lights])
-        towards = light_directions(self.scene) @ self.camera.rotation
-        return light_shares(visibility(mesh), normals, mesh.faces, towards, spreads)
 
     def _finished(self, pixels: NDArray[np.float16]) -> NDArray[np.uint8]:
         """Return premultiplied linear light and coverage over the background, in sRGB."""

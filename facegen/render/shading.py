@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from facegen.geometry.camera import Camera
 from facegen.geometry.mesh import Mesh
 from facegen.geometry.normals import face_normals, vertex_normals
-from facegen.render.occlusion import light_shares
+from facegen.render.occlusion import light_shares, visibility
 from facegen.render.scene import CLAY, INSIDE, Material, Scene
 
 # Linear brightness above which the tone curve bends, so that highlights keep their colour and never clip
@@ -57,26 +57,31 @@ class Surface:
     gloss: NDArray[np.float32]
 
 
-def surface(mesh: Mesh, camera: Camera, scene: Scene, *, flat: bool = False,
-            seen: NDArray[np.float32] | None = None, seen_normals: NDArray | None = None) -> Surface:
-    """Return a mesh prepared for shading; ``seen`` (n, 64) is its occlusion table, None means nothing is
-    hidden.
+def surface(mesh: Mesh, camera: Camera, scene: Scene, *, flat: bool = False, light: NDArray[np.float32] | None = None,
+            normals: NDArray | None = None) -> Surface:
+    """Return a mesh prepared for shading.
 
-    seen_normals: (n, 3) the normals that belong to ``seen`` where it was baked on another pose.
+    light: (n, 1 + lights) from `baked_light`; None means that nothing is hidden. normals: (n, 3) of the vertices,
+    where they are known already.
     """
-    smooth = vertex_normals(mesh.vertices, mesh.faces)
-    normals = face_normals(mesh.vertices, mesh.faces) if flat else smooth
-    light = np.ones((len(mesh.vertices), 1 + len(scene.lights)), np.float32)
-    if seen is not None:
-        baked = smooth if seen_normals is None else seen_normals
-        towards = light_directions(scene) @ camera.rotation
-        spreads = np.array([lamp.spread for lamp in scene.lights])
-        light = light_shares(seen, baked, mesh.faces, towards, spreads)
+    if light is None:
+        light = np.ones((len(mesh.vertices), 1 + len(scene.lights)), np.float32)
+    if flat:
+        normals = face_normals(mesh.vertices, mesh.faces)
+    elif normals is None:
+        normals = vertex_normals(mesh.vertices, mesh.faces)
     planes, origin, back = _corner_weights(mesh, camera)
     material = np.where(back, len(mesh.materials), mesh.face_materials).astype(np.int32)
     rows = material_rows(mesh, scene)
     return Surface(mesh.faces, (normals @ camera.rotation.T).astype(np.float32), flat, light, planes, origin, back,
                    material, rows[:, :3], rows[:, 3:6], rows[:, 6:])
+
+
+def baked_light(mesh: Mesh, normals: NDArray, camera: Camera, scene: Scene) -> NDArray[np.float32]:
+    """Return what reaches each vertex (n, 1 + lights): the ambient openness, and its share of each light."""
+    towards = light_directions(scene) @ camera.rotation
+    spreads = np.array([lamp.spread for lamp in scene.lights])
+    return light_shares(visibility(mesh), normals, mesh.faces, towards, spreads)
 
 
 def material_rows(mesh: Mesh, scene: Scene) -> NDArray[np.float32]:

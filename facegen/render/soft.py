@@ -10,10 +10,9 @@ from numpy.typing import NDArray
 from facegen.geometry.camera import Camera
 from facegen.geometry.mesh import Mesh
 from facegen.geometry.normals import vertex_normals
-from facegen.render.occlusion import visibility
 from facegen.render.request import Look
 from facegen.render.scene import Scene
-from facegen.render.shading import from_srgb, shade, surface, to_srgb
+from facegen.render.shading import baked_light, from_srgb, shade, surface, to_srgb
 from facegen.render.shadow import with_shadows
 from facegen.render.zbuffer import prepare, scan
 
@@ -28,14 +27,18 @@ class SoftBackend:
 
     def __init__(self, neutral: Mesh, camera: Camera, scene: Scene, look: Look) -> None:
         self.neutral, self.camera, self.scene, self.look = neutral, camera, scene, look
+        self._light = None
+        if look.occlusion == "neutral":
+            self._light = baked_light(neutral, vertex_normals(neutral.vertices, neutral.faces), camera, scene)
 
     def draw(self, vertices: NDArray[np.float64]) -> NDArray[np.uint8]:
         """Return the picture (h, w, 4) of checked vertices (n, 3)."""
         mesh, camera, scene, look = self.neutral.with_vertices(vertices), self.camera, self.scene, self.look
-        baked = None if look.occlusion == "off" else mesh if look.occlusion == "posed" else self.neutral
-        seen = None if baked is None else visibility(baked)
-        normals = None if baked is None or baked is mesh else vertex_normals(baked.vertices, baked.faces)
-        prepared = surface(mesh, camera, scene, flat=look.flat, seen=seen, seen_normals=normals)
+        light, normals = self._light, None
+        if look.occlusion == "posed":
+            normals = vertex_normals(mesh.vertices, mesh.faces)
+            light = baked_light(mesh, normals, camera, scene)
+        prepared = surface(mesh, camera, scene, flat=look.flat, light=light, normals=normals)
         if look.shadows:
             prepared = replace(prepared, light=with_shadows(prepared.light, mesh, camera, scene))
         width, height = camera.width, camera.height

@@ -90,9 +90,9 @@ def test_teeth_in_half_shadow_are_brighter_than_other_surfaces_and_dark_where_hi
     middle = np.full(1, 32.0)
 
     def brightness(seen, lift):
-        table = np.full((len(mesh.vertices), 64), seen, np.float32)
         scene = Scene(materials={"teeth": Material((240, 230, 210), 0.0, 1.0, lift=lift)})
-        return shade(surface(mesh, camera, scene, seen=table), camera, scene, one, middle, middle)[1, 0]
+        light = np.full((len(mesh.vertices), 1 + len(scene.lights)), seen, np.float32)
+        return shade(surface(mesh, camera, scene, light=light), camera, scene, one, middle, middle)[1, 0]
 
     assert brightness(0.15, 0.7) > 1.8 * brightness(0.15, 0.0)
     assert brightness(1.0, 0.7) == pytest.approx(brightness(1.0, 0.0))
