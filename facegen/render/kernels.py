@@ -475,9 +475,9 @@ def draw_bands(start, stop, step, items, starts, columns, vertices, faces, proj,
                     mask = 1 << sample
                     for other in range(sample + 1, 4):
                         at = p + np.uint64(other)
-                        if (abs(np.int64(buffer[at]) - nearest) < _STEP
-                                and (buffer[at + _LANES] == t or kind[np.uint64(buffer[at + _LANES])] == own)
-                                and left_over >> other & 1):
+                        also = buffer[at + _LANES]
+                        if buffer[at] > 0 and left_over >> other & 1 and (also == t or (
+                                kind[np.uint64(also)] == own and abs(np.int64(buffer[at]) - nearest) < _STEP)):
                             mask |= 1 << other
                     left_over &= ~mask
                     n = np.uint64(filled[own])

@@ -27,6 +27,7 @@ class SoftBackend:
 
     def __init__(self, neutral: Mesh, camera: Camera, scene: Scene, look: Look) -> None:
         self.neutral, self.camera, self.scene, self.look = neutral, camera, scene, look
+        self._behind = background_rows(look.background, scene, camera.height)
         self._light = None
         if look.occlusion == "neutral":
             self._light = baked_light(neutral, vertex_normals(neutral.vertices, neutral.faces), camera, scene)
@@ -48,7 +49,7 @@ class SoftBackend:
         for top in range(0, height, rows):
             bottom = min(top + rows, height)
             light, cover = _band(triangles, prepared, camera, scene, top, bottom)
-            picture[top:bottom] = _finished(light, cover, look.background, scene, top, height)
+            picture[top:bottom] = _finished(light, cover, self._behind[top:bottom], look.background == "transparent")
         return picture
 
 
@@ -72,35 +73,37 @@ def _band(triangles, prepared, camera, scene, top, bottom) -> tuple[NDArray[np.f
     ids, nearness = scan(triangles, top, bottom)
     rows, samples, width = ids.shape
     light = np.zeros((3, rows, width), np.float32)
-    hit = ids >= 0
-    cover = hit.mean(axis=1, dtype=np.float32)
-    y, x = np.nonzero(cover)
+    cover = (ids >= 0).mean(axis=1, dtype=np.float32)
+    whole = (ids[:, :1] == ids[:, 1:]).all(axis=1) & (ids[:, 0] >= 0)
+    y, x = np.nonzero(whole)
+    light[:, y, x] = shade(prepared, camera, scene, ids[y, 0, x], x + np.float32(0.5), y + np.float32(top + 0.5))
+
+    y, x = np.nonzero((cover > 0) & ~whole)
     ids, nearness = ids[y, :, x], nearness[y, :, x]                              # (k, samples)
-    kind = np.where(ids >= 0, prepared.material[ids], -1)
     free = ids >= 0
-    across, down = np.array(triangles.sample_x), (np.arange(samples) + 0.5) / samples
+    kind = np.where(free, prepared.material[ids], -1)
+    across, down = np.array(triangles.sample_x, np.float32), (np.arange(samples, dtype=np.float32) + 0.5) / samples
     for leader in range(samples):
         k = np.flatnonzero(free[:, leader])
         near = np.abs(nearness[k] - nearness[k, leader, None]) < np.float32(DEPTH_STEP)
-        group = free[k] & near & (kind[k] == kind[k, leader, None])
+        same = (ids[k] == ids[k, leader, None]) | (near & (kind[k] == kind[k, leader, None]))
+        group = (free[k] & same).astype(np.float32)
         count = group.sum(axis=1)
         colours = shade(prepared, camera, scene, ids[k, leader], x[k] + group @ across / count,
                         top + y[k] + group @ down / count)
-        light[:, y[k], x[k]] += colours * (count / samples).astype(np.float32)
-        free[k] &= ~group
+        light[:, y[k], x[k]] += colours * (count / samples)
+        free[k] &= group == 0
     return light, cover
 
 
-def _finished(light, cover, background, scene, top, height) -> NDArray[np.uint8]:
-    """Return the band (rows, width, 4) over its background: resolved in linear light, then sRGB."""
-    rows, width = cover.shape
-    out = np.empty((rows, width, 4), np.uint8)
-    if background == "transparent":
+def _finished(light, cover, behind, transparent) -> NDArray[np.uint8]:
+    """Return the band (rows, width, 4) over its background (rows, 3): resolved in linear light, then sRGB."""
+    out = np.empty((*cover.shape, 4), np.uint8)
+    if transparent:
         light = light / np.maximum(cover, np.float32(1e-6))
         out[..., 3] = np.rint(cover * 255)
     else:
-        behind = background_rows(background, scene, height)[top:top + rows].T[:, :, None]
-        light = light + behind * (1 - cover)
+        light = light + behind.T[:, :, None] * (1 - cover)
         out[..., 3] = 255
     out[..., :3] = np.moveaxis(to_srgb(light), 0, -1)
     return out
