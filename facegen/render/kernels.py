@@ -41,6 +41,7 @@ _MASKS = [[s for s in range(4) if mask >> s & 1] or [0] for mask in range(16)]
 _SPOT_X = np.array([np.mean([PATTERNS[4][s] / 256 for s in mask]) for mask in _MASKS], np.float32)
 _SPOT_Y = np.array([np.mean([(s + 0.5) / 4 for s in mask]) for mask in _MASKS], np.float32)
 _SHARE = np.array([len(mask) / 4 for mask in _MASKS], np.float32)
+_FIRST = np.array([0, 0, 1, 0, 2, 0, 1, 0, 3, 0, 1, 0, 2, 0, 1, 0], np.uint64)       # the first sample of a mask
 # Beyond this many sub-pixels (96 pixels) an edge function may leave 32 bits.
 _SMALL = 96 * 256
 _FARTHEST = 2.0**14
@@ -463,22 +464,15 @@ def draw_bands(start, stop, step, items, starts, columns, vertices, faces, proj,
                 if (buffer[p] | buffer[p + _P1] | buffer[p + _P2] | buffer[p + _P3]) == 0:
                     continue
                 left_over = 15
-                for sample in range(4):
-                    if not left_over >> sample & 1:
-                        continue
-                    at = p + np.uint64(sample)
-                    nearest = buffer[at]
-                    if nearest == 0:
+                while left_over:
+                    sample = _FIRST[left_over]
+                    at = p + sample
+                    if buffer[at] == 0:
+                        left_over &= left_over - 1
                         continue
                     t = buffer[at + _LANES]
                     own = kind[np.uint64(t)]
-                    mask = 1 << sample
-                    for other in range(sample + 1, 4):
-                        at = p + np.uint64(other)
-                        also = buffer[at + _LANES]
-                        if buffer[at] > 0 and left_over >> other & 1 and (also == t or (
-                                kind[np.uint64(also)] == own and abs(np.int64(buffer[at]) - nearest) < _STEP)):
-                            mask |= 1 << other
+                    mask = _group(buffer, p, sample, t, own, kind, left_over)
                     left_over &= ~mask
                     n = np.uint64(filled[own])
                     entry[own, n], target[own, n] = t, (row << _ROW_SHIFT) + (x << 4) + mask
@@ -488,13 +482,27 @@ def draw_bands(start, stop, step, items, starts, columns, vertices, faces, proj,
                     if n + _P1 == _CHUNK:
                         _flush(own, filled, entry, target, top, row_blocks, work, faces, attributes, planes,
                                material, flat, inside, powers, lamps, sky, view, colour)
-                    if left_over == 0:
-                        break
         for own in range(kinds):
             if filled[own]:
                 _flush(own, filled, entry, target, top, row_blocks, work, faces, attributes, planes, material, flat,
                        inside, powers, lamps, sky, view, colour)
         _finish(colour, row_blocks, top, bottom, left, right, behind, encode, transparent, picture)
+
+
+@njit(**OPTIONS)
+def _group(buffer, p, sample, t, own, kind, left_over):
+    """Return which of a pixel's samples see the same surface as this one: its triangle, or its material as near."""
+    q = p + _LANES
+    if left_over == 15 and (buffer[q + _P1] == t and buffer[q + _P2] == t and buffer[q + _P3] == t
+                            and min(buffer[p + _P1], buffer[p + _P2], buffer[p + _P3]) > 0):
+        return 15
+    nearest, mask = np.int64(buffer[p + sample]), 0
+    for other in range(_P4):
+        here, also = buffer[p + other], buffer[q + other]
+        if here > 0 and left_over >> np.int64(other) & 1 and (also == t or (
+                kind[np.uint64(also)] == own and abs(here - nearest) < _STEP)):
+            mask |= 1 << np.int64(other)
+    return mask
 
 
 @njit(**OPTIONS)
