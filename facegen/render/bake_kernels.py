@@ -79,10 +79,10 @@ def visible(points, local, normals, frames, first, step, seen):
                 c = np.uint64(cell[i])
                 grid[0, c] = max(grid[0, c], height[i])
                 grid[1, c] = max(grid[1, c], -height[i])
-        filled[:] = grid
         for side in range(2):
-            for c in range(GRID + 1, _CELLS - GRID - 1):
-                if grid[side, c] == _EMPTY:
+            for c in range(_CELLS):
+                filled[side, c] = grid[side, c]
+                if grid[side, c] == _EMPTY and GRID < c < _CELLS - GRID - 1:
                     filled[side, c] = max(min(grid[side, c - 1], grid[side, c + 1]),
                                           min(grid[side, c - GRID], grid[side, c + GRID]))
         for v in range(n):

@@ -471,7 +471,7 @@ def draw_bands(start, stop, step, items, starts, columns, vertices, faces, proj,
                         left_over &= left_over - 1
                         continue
                     t = buffer[at + _LANES]
-                    own = kind[np.uint64(t)]
+                    own = np.int64(kind[np.uint64(t)])
                     mask = _group(buffer, p, sample, t, own, kind, left_over)
                     left_over &= ~mask
                     n = np.uint64(filled[own])
@@ -497,7 +497,7 @@ def _group(buffer, p, sample, t, own, kind, left_over):
                             and min(buffer[p + _P1], buffer[p + _P2], buffer[p + _P3]) > 0):
         return 15
     nearest, mask = np.int64(buffer[p + sample]), 0
-    for other in range(_P4):
+    for other in range(np.uint64(0), _P4):
         here, also = buffer[p + other], buffer[q + other]
         if here > 0 and left_over >> np.int64(other) & 1 and (also == t or (
                 kind[np.uint64(also)] == own and abs(here - nearest) < _STEP)):
