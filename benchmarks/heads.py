@@ -76,7 +76,18 @@ def refined(faces: NDArray, points: NDArray, triangles: int) -> tuple[NDArray, N
         ends_of = np.repeat(np.arange(len(order)), 2), edges[order].ravel()
         half = sparse.csr_array((np.full(2 * len(order), 0.5), ends_of), shape=(len(order), len(position)))
         matrix = sparse.csr_array(sparse.vstack([matrix, half @ matrix]))
-    return faces.astype(np.int32), parents, matrix
+    return _in_order(faces, parents, matrix)
+
+
+def _in_order(faces: NDArray, parents: NDArray, matrix: sparse.csr_array) -> tuple[NDArray, NDArray, sparse.csr_array]:
+    """Return the same with neighbours near each other in memory: scattered vertices would slow every renderer."""
+    rows = np.argsort(parents, kind="stable")
+    faces, parents = faces[rows], parents[rows]
+    used, first = np.unique(faces.ravel(), return_index=True)
+    order = used[np.argsort(first)]
+    place = np.empty(matrix.shape[0], np.int32)
+    place[order] = np.arange(len(order))
+    return place[faces], parents, sparse.csr_array(matrix[order])
 
 
 def _skin_count(face: facegen.Face, detail: int) -> int:

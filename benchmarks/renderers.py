@@ -80,7 +80,8 @@ def measure(folder: Path, *, quick: bool) -> report.Measured:
     names = facegen_names(RENDERERS[1:]) + list(PEERS)
     few = {"frames": 9, "seconds": 1.0} if quick else {"frames": 30, "seconds": 6.0}
     many = few if quick else {"frames": 45, "seconds": 15.0}
-    out = report.Measured(quick=quick)
+    load = os.getloadavg()[0] if hasattr(os, "getloadavg") else float("nan")
+    out = report.Measured(quick=quick, load=load)
     for triangles in RACE if quick else CURVE:
         _say(f"{triangles} triangles")
         how = many if triangles in RACE else few

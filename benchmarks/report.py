@@ -9,6 +9,7 @@ import statistics
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from importlib.metadata import PackageNotFoundError, version
+from operator import attrgetter
 from pathlib import Path
 
 from worker import PEERS
@@ -51,10 +52,15 @@ Field = dict[str, Result]
 
 @dataclass
 class Measured:
-    """All figures of a run. Fields by triangles, by detail of the whole face and by pixels; start-up in seconds (empty
-    caches, later); seconds a pose; seconds of a frame's two halves by renderer, detail and occlusion."""
+    """All figures of a run.
+
+    ``load``: how many other processes wanted to run before it. Fields by triangles, by detail of the whole face and by
+    pixels; start-up in seconds (empty caches, later); seconds a pose; seconds of a frame's two halves by renderer,
+    detail and occlusion.
+    """
 
     quick: bool
+    load: float
     triangles: dict[int, Field] = field(default_factory=dict)
     whole: dict[int, Field] = field(default_factory=dict)
     pixels: dict[int, Field] = field(default_factory=dict)
@@ -87,7 +93,7 @@ def text(measured: Measured, *, plotted: bool) -> str:
         "all threads of the process; the skin of the face is cut into as many triangles as said.",
         _table(race, lambda n: f"{n:,}", lambda r: f"{r.cpu:.1f} ({r.least:.1f})"),
         "The same in wall milliseconds, median:",
-        _table(race, lambda n: f"{n:,}", lambda r: f"{r.wall:.1f}"),
+        _table(race, lambda n: f"{n:,}", lambda r: f"{r.wall:.1f}", attrgetter("wall")),
         "The whole face, with hair, eyes, teeth and tongue (detail 2 is what a picture of 512 pixels shows), CPU "
         "milliseconds:",
         _table(measured.whole, lambda d: whole[d], lambda r: f"{r.cpu:.1f} ({r.least:.1f})"),
@@ -152,7 +158,7 @@ def _opening(measured: Measured) -> str:
     command = "python benchmarks/renderers.py" + (" --quick" if measured.quick else "")
     lines = [f"`{command}`, {datetime.date.today().isoformat()}, on {_processor()}, {len(_cores())} cores, "
              f"{platform.system()}, Python {platform.python_version()}; {', '.join(_versions())}; "
-             f"OpenGL: {_driver(measured)}."]
+             f"OpenGL: {_driver(measured)}. Load of the machine before the run: {measured.load:.1f}."]
     if measured.quick:
         lines.append("**A quick run with few frames: its figures are rough.**")
     return "\n".join(lines)
@@ -168,15 +174,15 @@ def _reading(race: dict[int, Field], measured: Measured) -> str:
             lines.append(f"- {count:,} triangles: facegen fast on one thread takes {row[OURS].cpu:.1f} ms, the fastest "
                          f"peer ({rival}) {row[rival].cpu:.1f} ms of CPU: **{ratio:.1f} times** less (target "
                          f"{_TARGETS[count]:g}: {verdict}).")
-    for title, row in [*((f"{n:,} triangles", r) for n, r in measured.triangles.items()),
-                       *((f"the whole face at detail {n}", r) for n, r in measured.whole.items()),
-                       *((f"{n} x {n} pixels", r) for n, r in measured.pixels.items() if n != 512)]:
-        rival = _fastest_peer(row)
-        behind = [] if rival is None else [f"{label(name).replace('**', '')} ({row[name].cpu / row[rival].cpu:.1f} x)"
-                                           for name in row if name not in PEERS and _ran(row, name)
-                                           and row[name].cpu > row[rival].cpu]
-        if behind:
-            lines.append(f"- Behind the fastest peer ({rival}) at {title}, in CPU time: {', '.join(behind)}.")
+    fields = [*measured.triangles.values(), *measured.whole.values(), *measured.pixels.values()]
+    for name in _names(race):
+        shares = [row[name].cpu / row[rival].cpu for row in fields
+                  if name not in PEERS and _ran(row, name) and (rival := _fastest_peer(row))]
+        if shares:
+            behind = sum(share > 1 for share in shares)
+            where = f"behind it in {behind} of {len(shares)}" if behind else "ahead of it in all"
+            lines.append(f"- {label(name)} takes {min(shares):.2f} to {max(shares):.2f} times the CPU time of the "
+                         f"fastest peer over all heads and sizes below; {where}.")
     if _fastest_peer(next(iter(race.values()))) is None:
         lines.append("- No peer is installed here, so nothing is compared.")
     lines.append("- The pictures are not equal work. facegen shades skin that light creeps through, four lights with "
@@ -209,12 +215,13 @@ def _method(measured: Measured) -> str:
         *absent])
 
 
-def _table(rows: dict[int, Field], head: Callable[[int], str], cell: Callable[[Result], str]) -> str:
+def _table(rows: dict[int, Field], head: Callable[[int], str], cell: Callable[[Result], str],
+           measure: Callable[[Result], float] = attrgetter("cpu")) -> str:
     lines = [(label(name), *(cell(row[name]) if _ran(row, name) else "missing" for row in rows.values()))
              for name in _names(rows)]
-    ratios = ["" if (rival := _fastest_peer(row)) is None or not _ran(row, OURS)
-              else f"{row[rival].cpu / row[OURS].cpu:.1f} ({rival})" for row in rows.values()]
-    return _markdown(("renderer", *map(head, rows)), [*lines, ("*fastest peer / fast, 1 thread, CPU*", *ratios)])
+    ratios = ["" if (rival := _fastest_peer(row, measure)) is None or not _ran(row, OURS)
+              else f"{measure(row[rival]) / measure(row[OURS]):.1f} ({rival})" for row in rows.values()]
+    return _markdown(("renderer", *map(head, rows)), [*lines, ("*fastest peer / fast, 1 thread*", *ratios)])
 
 
 def _start_table(measured: Measured) -> str:
@@ -251,8 +258,8 @@ def _names(rows: dict[int, Field]) -> list[str]:
     return list(next(iter(rows.values())))
 
 
-def _fastest_peer(row: Field) -> str | None:
-    return min((name for name in PEERS if _ran(row, name)), key=lambda name: row[name].cpu, default=None)
+def _fastest_peer(row: Field, measure: Callable[[Result], float] = attrgetter("cpu")) -> str | None:
+    return min((name for name in PEERS if _ran(row, name)), key=lambda name: measure(row[name]), default=None)
 
 
 def _versions() -> list[str]:
