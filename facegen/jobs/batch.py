@@ -12,7 +12,7 @@ from typing import Any
 
 from facegen import __version__
 from facegen.errors import FileError, InputError
-from facegen.facs.yamlfile import parse_json
+from facegen.facs.yamlfile import parse_json, read_data
 from facegen.fileio.textfile import make_folder, remove_drafts, save_text
 from facegen.jobs.crew import Crew
 from facegen.jobs.digests import digest_of
@@ -21,7 +21,7 @@ from facegen.jobs.naming import file_names
 from facegen.jobs.picture import IMAGES, LABELS, MASKS, PictureTask, picture_tasks
 from facegen.jobs.runner import run
 from facegen.jobs.spec import FORMATS, Batch, read_batch
-from facegen.render.backends import choose, warm
+from facegen.render.backends import RENDERERS, choose, warm
 
 MARK = "batch.json"
 """Tells whose folder it is, from the first moment on."""
@@ -60,15 +60,13 @@ def run_batch(jobs: str | Path | Mapping[str, Any] | Batch, folder: str | Path, 
     if scheduler is not None and (executor is not None or workers is not None):
         raise InputError("scheduler: give either a scheduler or an executor or workers")
     batch = jobs if isinstance(jobs, Batch) else read_batch(jobs)
-    pixels = max((math.prod(p.size) for p in batch.pictures), default=0)
-    # Settled here, not by each worker: their pictures must not differ.
-    chosen = choose(batch.settings.renderer, pictures=len(batch.pictures), pixels=pixels)
-    batch = replace(batch, settings=replace(batch.settings, renderer=chosen))
     root = Path(folder).absolute()
+    chosen = _renderer(batch, root)
+    batch = replace(batch, settings=replace(batch.settings, renderer=chosen))
     names = file_names(batch.pictures)
     alone = executor is None and scheduler is None and workers == 1
     tasks = picture_tasks(root, names, list(batch.pictures), batch.settings, threads=None if alone else 1)
-    mark = {"facegen": __version__, "pictures": len(tasks),
+    mark = {"facegen": __version__, "pictures": len(tasks), "renderer": chosen,
             "batch": digest_of([names, [asdict(p) for p in batch.pictures], asdict(batch.settings)])}
     known = _check_folder(root, mark, update=update)
     if scheduler is not None:
@@ -94,6 +92,17 @@ def run_batch(jobs: str | Path | Mapping[str, Any] | Batch, folder: str | Path, 
         remove_drafts(root / file for task in tasks for file in (task.file, task.mask) if file)
     return BatchReport(report.made, report.kept, removed, report.lost,
                        write_manifest(root, tasks, batch.settings))
+
+
+def _renderer(batch: Batch, root: Path) -> str:
+    """Return the renderer for all pictures: settled here, not by each worker, and as it was settled for the folder."""
+    wanted = batch.settings.renderer
+    if wanted == "auto" and (root / MARK).is_file():
+        there = read_data(root / MARK)
+        before = there.get("renderer") if isinstance(there, dict) else None
+        wanted = before if before in RENDERERS else "auto"
+    pixels = max((math.prod(one.size) for one in batch.pictures), default=0)
+    return choose(wanted, pictures=len(batch.pictures), pixels=pixels)
 
 
 def _check_folder(root: Path, mark: Mapping[str, Any], *, update: bool) -> bool:

@@ -39,17 +39,17 @@ RENDERERS = ("auto", *_HOMES)
 _WORTH_COMPILING = 6e6
 
 
-def choose(renderer: str, *, pictures: int | None = None, pixels: int = 0) -> str:
+def choose(renderer: str, *, pictures: int | None = None, pixels: int = 0, now: bool = False) -> str:
     """Return the name of the renderer to use; InputError for one that is unknown or whose package is missing.
 
     "auto" is the compiled renderer where numba is installed and ``pictures`` of so many ``pixels`` are worth its
-    start; None is an unknown, large number. Whether it was compiled before does not count: a film that goes on after
-    a stop must choose again as it did.
+    start; None is an unknown, large number. That it is in memory counts only for what is drawn ``now``: a film that
+    goes on after a stop must choose again as it did.
     """
     check_choice("renderer", renderer, RENDERERS)
     if renderer == "auto":
         worth = pictures is None or pictures * pixels >= _WORTH_COMPILING
-        loaded = pictures == 1 and _HOMES["fast"][0] in sys.modules
+        loaded = now and _HOMES["fast"][0] in sys.modules
         return "fast" if (worth or loaded) and find_spec("numba") else "soft"
     if renderer in _NEEDS and find_spec(_NEEDS[renderer]) is None:
         raise InputError(f"renderer: {renderer!r} needs the package {_NEEDS[renderer]}, which is not installed: "

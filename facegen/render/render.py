@@ -91,7 +91,7 @@ def render(thing: Mesh | Rig, pose: Any = None, *, size: int | tuple[int, int] =
     """
     size, view = check_size(size), check_view(view)
     look = check_look(background=background, shading=shading, occlusion=occlusion, threads=threads, shadows=shadows)
-    name = choose(renderer, pictures=1, pixels=size[0] * size[1])
+    name = choose(renderer, pictures=1, pixels=size[0] * size[1], now=True)
     mesh, level = neutral_mesh(thing, detail=detail, size=size, view=view, orthographic=orthographic,
                                flat=look.flat, camera=camera)
     lines = check_wireframe(wireframe, thing, mesh, level)

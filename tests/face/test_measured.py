@@ -80,6 +80,8 @@ def test_child_and_adult_share_the_table(face, tmp_path):
 
     data = yaml.safe_load((folder / "face.yaml").read_text())
     data["parts"], data["folds"] = [], {}
+    (folder / "landmarks.yaml").unlink()
+    data.pop("landmarks", None)
 
     def twice(v):
         return [2 * x for x in v]

@@ -194,7 +194,9 @@ def start(folder: Path) -> subprocess.Popen:
     (folder / "log").mkdir()
     script = folder / "log" / "script.py"
     script.write_text(SCRIPT.format(here=str(Path(__file__).parent), folder=str(folder)))
-    process = subprocess.Popen([sys.executable, "-u", str(script)], stderr=subprocess.PIPE, text=True)
+    # Started in the background by a shell we would be deaf to Ctrl-C, and so would be our children.
+    process = subprocess.Popen([sys.executable, "-u", str(script)], stderr=subprocess.PIPE, text=True,
+                               preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL))
     deadline = time.monotonic() + 30
     while len(texts(folder)) < 4:
         assert time.monotonic() < deadline
