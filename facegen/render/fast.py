@@ -36,7 +36,10 @@ _WORTH_THREADS = 256 * 256
 
 
 class FastBackend:
-    """Draws poses of one mesh for one camera with the kernels of numba; buffers and constants are kept."""
+    """Draws poses of one mesh for one camera with the kernels of numba; buffers and constants are kept.
+
+    The buffers are shared by all draws: one caller at a time.
+    """
 
     def __init__(self, neutral: Mesh, camera: Camera, scene: Scene, look: Look) -> None:
         self.neutral, self.camera, self.scene, self.look = neutral, camera, scene, look
@@ -122,7 +125,7 @@ class FastBackend:
         if self._threads == 1:
             work(0)
         else:
-            list(_pool(self._threads).map(work, range(self._threads)))
+            list(_pool(self._threads, os.getpid()).map(work, range(self._threads)))
 
 
 def _own(vertices: NDArray) -> NDArray[np.float64]:
@@ -149,7 +152,8 @@ def _sequence() -> NDArray[np.float32]:
 
 
 @cache
-def _pool(threads: int) -> ThreadPoolExecutor:
+def _pool(threads: int, process: int) -> ThreadPoolExecutor:
+    """Return the threads of a process: a forked child inherits the object, but none that works."""
     return ThreadPoolExecutor(threads, thread_name_prefix="facegen-bands")
 
 

@@ -7,6 +7,9 @@ arrays, which the compiler turns into vector instructions. Normals and planes ar
 that own a pixel.
 
 Integers are spelt np.int32(...) everywhere on purpose: numba widens sums to 64 bits, which halves the lanes.
+
+A camera is here an array ``cam`` (18,): nine of its rotation, three of its target, its distance, scale and offset x, y,
+1 if it is orthographic, and its near plane's depth.
 """
 
 from __future__ import annotations
@@ -55,6 +58,7 @@ WORK_ROWS = 17
 (_NX, _NY, _NZ, _VX, _VY, _VZ, _NV, _FREE, _R, _G, _B, _SR, _SG, _SB, _X, _Y, _REACH) = (
     np.uint64(CHUNK * row) for row in range(WORK_ROWS))
 _CHUNK = np.uint64(CHUNK)
+# Small unsigned numbers, for indices.
 (_P0, _P1, _P2, _P3, _P4, _P5, _P6, _P7, _P8, _P9, _P10, _P11, _P12, _P13, _P14, _P15, _P16, _P17) = (
     np.uint64(k) for k in range(18))
 

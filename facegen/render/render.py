@@ -37,7 +37,8 @@ class Renderer:
     threads: how many of this process's threads may work on one picture; None is one a core. Give 1 where several
         processes draw.
 
-    ``camera``, ``mesh`` (the neutral), ``detail`` and ``renderer`` (the name of the one chosen) can be read.
+    ``camera``, ``mesh`` (the neutral), ``detail`` and ``renderer`` (the name of the one chosen) can be read. One caller
+    at a time: each thread needs its own.
 
     Raises InputError. ::
 

@@ -79,6 +79,28 @@ def test_the_threads_make_no_difference():
     assert np.array_equal(one, three)
 
 
+def draw_in_child(renderer, queue):
+    queue.put(renderer.draw())
+
+
+@pytest.mark.skipif(not hasattr(__import__("os"), "fork"), reason="this system does not fork")
+@pytest.mark.filterwarnings("ignore:.*fork.*:DeprecationWarning")
+def test_a_forked_child_draws_too():
+    import multiprocessing
+
+    renderer = Renderer(SEVERAL, size=300, renderer="fast", threads=2)
+    expected = renderer.draw()
+    fork = multiprocessing.get_context("fork")
+    queue = fork.Queue()
+    child = fork.Process(target=draw_in_child, args=(renderer, queue))
+    child.start()
+    try:
+        assert np.array_equal(queue.get(timeout=30), expected)
+    finally:
+        child.kill()
+        child.join()
+
+
 def test_frames_do_not_depend_on_those_before():
     renderer = Renderer(load_face(), size=128, renderer="fast")
     assert renderer.renderer == "fast"
