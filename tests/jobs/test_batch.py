@@ -274,8 +274,8 @@ def test_a_stopped_run_goes_on_where_it_was(tmp_path, how, workers):
 def test_a_killed_worker_process_is_replaced(tmp_path, contents):
     run_batch(MANY, tmp_path / "serial", workers=1)
     process = start(tmp_path, MANY, "--workers", "2", "--json")
-    children = subprocess.run(["ps", "-ww", "-o", "pid=,args=", "--ppid", str(process.pid)], capture_output=True, text=True,
-                              check=True).stdout.splitlines()
+    children = subprocess.run(["ps", "-ww", "-o", "pid=,args=", "--ppid", str(process.pid)], capture_output=True,
+                              text=True, check=True).stdout.splitlines()
     worker = next(int(line.split()[0]) for line in children if "spawn_main" in line)
     os.kill(worker, signal.SIGKILL)
     out, err = process.communicate(timeout=60)
