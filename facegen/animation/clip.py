@@ -148,11 +148,9 @@ class Track:
         return tuple(key.t for key in self.keyframes)
 
     def shares(self, t: float) -> list[tuple[float, Pose]]:
-        """Return the poses that are there at a time, each with its share; the shares sum to at most 1."""
+        """Return the poses that are there at a time, each with its strength 0..1."""
         if self.events:
-            found = [(strength, event.pose) for event in self.events if (strength := event.strength(t)) > 0.0]
-            total = sum(strength for strength, _ in found)
-            return [(strength / total, pose) for strength, pose in found] if total > 1.0 else found
+            return [(strength, event.pose) for event in self.events if (strength := event.strength(t)) > 0.0]
         after = bisect.bisect_right(self._times, t)
         if after == 0:
             return [(1.0, self.keyframes[0].pose)]
@@ -264,7 +262,9 @@ class Clip:
                 raw = [(share * kept, one) for share, one in raw if kept]
             else:
                 atoms.update((atom, atoms[atom] * kept) for atom in track.replaces if atom in atoms)
-            raw += [(share, pose.raw) for share, pose in shares if pose.raw is not None]
+            mine = [(share, pose.raw) for share, pose in shares if pose.raw is not None]
+            beyond = max(1.0, math.fsum(share for share, _ in mine))
+            raw += [(share / beyond, one) for share, one in mine]
             _add(atoms, shares)
         if self.idle is not None:
             _add(atoms, [(1.0, Pose(self.idle.at(t)))])
@@ -288,14 +288,17 @@ def frame_time(k: int, fps: float) -> float:
 
 
 def _add(atoms: dict[str, float], shares: Sequence[tuple[float, Pose]]) -> None:
-    """Add poses to weights; a weight ends at 1."""
+    """Add poses to weights; a weight ends at 1. Poses that move the same atom share it where they sum beyond 1."""
+    present: dict[str, list[float]] = {}
     total: dict[str, list[float]] = {}
     for share, pose in shares:
         for atom, weight in pose.atoms.items():
             total.setdefault(atom, []).append(share * weight)
+            present.setdefault(atom, []).append(share)
     for atom, several in total.items():
         # fsum, so that neither the order nor the side of a track changes a bit
-        atoms[atom] = min(1.0, atoms.get(atom, 0.0) + math.fsum(several))
+        weight = math.fsum(several) / max(1.0, math.fsum(present[atom]))
+        atoms[atom] = min(1.0, atoms.get(atom, 0.0) + weight)
 
 
 def _mirrored(atom: str) -> str:

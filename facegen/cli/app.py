@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import signal
 import sys
 from collections.abc import Sequence
 from typing import Annotated
@@ -53,7 +54,15 @@ def facegen(context: typer.Context,
 
 
 def run(argv: Sequence[str] | None = None) -> int:
-    """Run one command line (default: the process's own) and return the exit code."""
+    """Run one command line (default: the process's own, which then ends) and return the exit code."""
+    try:
+        return _run(argv)
+    finally:
+        if argv is None:        # a Ctrl-C more would only print a traceback from the interpreter's own end
+            signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+
+def _run(argv: Sequence[str] | None) -> int:
     for stream in (sys.stdout, sys.stderr):        # a name that a narrow console cannot show is no failure
         if hasattr(stream, "reconfigure"):
             stream.reconfigure(errors="replace")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import time
 from collections.abc import Callable
 from concurrent.futures import Future
@@ -12,6 +13,7 @@ from facegen.errors import InputError
 WAIT = 5.0
 """Seconds to wait for a scheduler, and for its first worker."""
 
+_ADDRESS = re.compile(r"([a-z+]+://)?[^\s/]+:[0-9]{1,5}/?")
 _RECOUNT = 5.0      # seconds after which workers are counted again: they may join and leave while the work runs
 
 
@@ -22,6 +24,8 @@ def connect(address: str, *, wait: float | None = None) -> Cluster:
     distributed is not installed, nothing answers, or no worker is there.
     """
     wait = WAIT if wait is None else wait
+    if not _ADDRESS.fullmatch(address):     # distributed would look for it for a while, and then leave loose ends
+        raise InputError(f"scheduler: expected an address such as tcp://10.0.0.7:8786, got {address!r}")
     try:
         from distributed import Client
     except ImportError as error:

@@ -141,6 +141,28 @@ def _end_with_parent() -> None:
 
 
 @contextmanager
+def one_interrupt() -> Iterator[None]:
+    """Let one Ctrl-C through; more of them change nothing until all is put away.
+
+    A second one would break into the first one's clean-up, with a lock held that the workers wait for.
+    """
+    before = signal.getsignal(signal.SIGINT)
+    if threading.current_thread() is not threading.main_thread() or before is not signal.default_int_handler:
+        yield               # no business of ours: somebody else answers Ctrl-C, or nobody
+        return
+
+    def once(number: int, frame: Any) -> None:
+        signal.signal(signal.SIGINT, signal.SIG_IGN)
+        raise KeyboardInterrupt
+
+    signal.signal(signal.SIGINT, once)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
+
+
+@contextmanager
 def _interrupts_held() -> Iterator[None]:
     """Hold Ctrl-C back while processes start: they inherit this, and a half-started one would die with a traceback."""
     if not hasattr(signal, "pthread_sigmask"):

@@ -30,7 +30,7 @@ from facegen.facs.deformation import Deformation
 from facegen.facs.expressions import Resolution, resolve
 from facegen.facs.yamlfile import read_data
 from facegen.fileio.textfile import make_folder, save_text, whole_file
-from facegen.fileio.video import check_film, save_video
+from facegen.fileio.video import FORMATS, check_film, save_video
 from facegen.geometry.camera import Camera, check_view, frame
 from facegen.jobs.runner import Report, run, shared
 from facegen.render.backends import choose, warm
@@ -208,6 +208,8 @@ class _Target:
 
     def __init__(self, path: Path, size: tuple[int, int], fps: float) -> None:
         self.path, self.fps = path, fps
+        if path.suffix.lower() in FORMATS and path.is_dir():
+            raise FileError(f"{path}: is a folder, expected a file")
         self.is_film = bool(path.suffix) and not path.is_dir()
         if self.is_film:
             check_film(path, size=size, fps=fps)

@@ -23,7 +23,7 @@ from typing import Any, Protocol, TypeVar
 
 from facegen.errors import FacegenError, InputError, JobError
 from facegen.fileio.textfile import remove_drafts
-from facegen.jobs.crew import Crew, GivenExecutor, LocalProcesses, stopping
+from facegen.jobs.crew import Crew, GivenExecutor, LocalProcesses, one_interrupt, stopping
 from facegen.render.request import available_cores
 
 LARGEST_CHUNK = 16
@@ -89,7 +89,8 @@ def run(tasks: Iterable[Task], *, executor: Executor | Crew | None = None, worke
         crew = LocalProcesses(cores) if executor is None else \
             GivenExecutor(executor, workers) if isinstance(executor, Executor) else executor
         size = chunk or max(1, min(LARGEST_CHUNK, len(tasks) // (crew.slots * CHUNKS_A_WORKER)))
-        return _Run(tasks, crew, size, step).finish()
+        with one_interrupt():
+            return _Run(tasks, crew, size, step).finish()
     finally:
         remove_drafts(task.output for task in tasks)
 

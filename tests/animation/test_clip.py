@@ -92,9 +92,25 @@ def test_replace_all_and_replace_some():
 def test_overlapping_events_hand_over():
     one, two = Event(0, Pose({"17": 1.0}), 0.2, 0.4, 0.2), Event(0.2, Pose({"17": 1.0}), 0.2, 0.4, 0.2)
     track = Track("sounds", events=(one, two))
-    assert track.shares(0.4) == [(0.5, one.pose), (0.5, two.pose)]
+    assert track.shares(0.4) == [(1.0, one.pose), (1.0, two.pose)]
     assert Clip((track,), 1.0).units_at(0.4) == {"17": 1.0}
     assert track.shares(2.0) == []
+
+
+def test_a_blink_closes_over_a_smile_and_leaves_it_alone():
+    smile = Event(0, Pose({"L12": 0.8, "R12": 0.8}), 0.2, 1.0, 0.2)
+    blink, less = (Event(0.5, pose, 0.05, 0.05, 0.1) for pose in (Pose({"L45": 1.0, "R45": 1.0}), Pose({"L12": 0.4})))
+    assert Clip((Track("one", events=(smile, blink)),), 2.0).units_at(0.57) == {"12": 0.8, "45": 1.0}
+    assert Clip((Track("one", events=(smile, less)),), 2.0).units_at(0.57) == pytest.approx({"L12": 0.6, "R12": 0.8})
+
+
+def test_the_example_blinks_and_nods_without_losing_its_smile():
+    from pathlib import Path
+
+    clip = facegen.load_clip(Path(__file__).parents[2] / "examples" / "greeting.yaml")
+    frames = [clip.units_at(2.0 + k / 100) for k in range(130)]
+    assert max(units.get("45", 0.0) for units in frames) == 1.0
+    assert min(units.get("12", 0.0) for units in frames) == pytest.approx(max(units["12"] for units in frames))
 
 
 def test_event_times():

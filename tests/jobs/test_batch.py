@@ -271,6 +271,20 @@ def test_a_stopped_run_goes_on_where_it_was(tmp_path, how, workers):
     assert len(after) == COUNT
 
 
+@pytest.mark.parametrize("gap", [0.005, 0.1])
+def test_more_than_one_interrupt_ends_it_all_the_same(tmp_path, gap):
+    process = start(tmp_path, MANY, "--workers", "2")
+    for _ in range(3):
+        os.kill(process.pid, signal.SIGINT)
+        time.sleep(gap)
+    try:
+        _, err = process.communicate(timeout=20)
+    finally:
+        process.kill()
+    assert process.returncode == 1
+    assert err == "facegen: stopped; the finished pictures stay: run the same again to go on\n"
+
+
 def test_a_killed_worker_process_is_replaced(tmp_path, contents):
     run_batch(MANY, tmp_path / "serial", workers=1)
     process = start(tmp_path, MANY, "--workers", "2", "--json")

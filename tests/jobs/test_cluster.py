@@ -122,6 +122,7 @@ def free_port() -> int:
     ("tcp://127.0.0.1:{}", r"nothing answers at tcp://127\.0\.0\.1:\d+ \(waited 1 s\)"),
     ("nonsense://x:1", "scheduler: expected an address such as tcp://"),
     ("", "scheduler: expected an address such as tcp://"),
+    ("nonsense", "scheduler: expected an address such as tcp://"),
 ])
 def test_no_scheduler_there(address, words):
     start = time.monotonic()

@@ -243,3 +243,10 @@ def test_killed_in_mid_run_it_goes_on(tmp_path):
     assert sorted(tmp_path.iterdir()) == [out, script]
     with Image.open(out) as film:
         assert film.n_frames > 50
+
+
+def test_a_folder_with_a_films_name(tmp_path):
+    (tmp_path / "film.mp4").mkdir()
+    with pytest.raises(facegen.FileError, match=r"film\.mp4: is a folder, expected a file"):
+        save_clip(facegen.morph("0", "12"), tmp_path / "film.mp4", size=32, fps=2)
+    assert not list((tmp_path / "film.mp4").iterdir())
