@@ -24,7 +24,7 @@ from facegen.cli.options import (
     read_what,
     warn,
 )
-from facegen.cli.picture import Background, Detail
+from facegen.cli.picture import Background, Detail, RendererName
 from facegen.errors import InputError
 
 if TYPE_CHECKING:
@@ -37,7 +37,6 @@ Out = Annotated[Path | None, typer.Option(
     "--output", "-o", metavar="OUT", help="Where the film goes: .mp4, .webm, .gif, .webp or .apng; a name without "
                                           "suffix is a folder of numbered pictures. [required]")]
 Rate = Annotated[float, typer.Option("--fps", metavar="N", help="Frames a second.")]
-RendererName = Annotated[str, typer.Option("--renderer", metavar="NAME", help="Who draws; auto takes the quickest.")]
 Workers = Annotated[int | None, typer.Option(
     "--workers", min=1, metavar="N", help="Processes that draw; one for each core by default.")]
 Seed = Annotated[int | None, typer.Option(

@@ -66,8 +66,6 @@ class _Level:
     lid_vertices: tuple[NDArray[np.int64], ...]
     folds: Array                        # (f, n_surface, 3) displacement at amount one
     head_weight: Array                  # (n, 1)
-    points: sparse.csr_array            # feature points on the surface, from the vertices
-    landmarks: sparse.csr_array         # the same for landmarks
 
 
 class Face:
@@ -78,6 +76,8 @@ class Face:
         self.name = data.name
         self.deformer: Deformer = data.deformer
         self._levels: dict[int, _Level] = {}
+        self._points_on: dict[int, sparse.csr_array] = {}       # worked out when asked for, by detail
+        self._landmarks_on: dict[int, sparse.csr_array] = {}
 
     # -- what there is ------------------------------------------------------------------------------------------
     @property
@@ -91,7 +91,7 @@ class Face:
         ``vertices`` (n, 3) of ``mesh(detail)``, such as :meth:`pose` gives. A feature point is a vertex of the cage;
         the smooth surface runs a little inside the cage, and this is the place on the surface that belongs to it.
         """
-        return _placed(self._data.point_names, self._level(detail).points, vertices, detail)
+        return _placed(self._data.point_names, self._point_weights(detail), vertices, detail)
 
     @property
     def landmarks(self) -> tuple[str, ...]:
@@ -106,7 +106,7 @@ class Face:
             points = face.landmark_points(face.pose("happiness"))
             points["mouth_corner_L"] - points["mouth_corner_R"]
         """
-        return _placed(self.landmarks, self._level(detail).landmarks, vertices, detail)
+        return _placed(self.landmarks, self._landmark_weights(detail), vertices, detail)
 
     def cage_sides(self, detail: int = 2) -> NDArray[np.bool_]:
         """Return which sides (m, 3) of the triangles of ``mesh(detail)`` run along the cage's edges.
@@ -325,12 +325,20 @@ class Face:
         mesh = merge([skin, *(a.mesh for a in d.attachments)])
         normals = vertex_normals(neutral, faces)
         folds = np.array([fold_field(f, neutral, normals) for f in d.folds.values()]).reshape(len(d.folds), n, 3)
-        return _Level(matrix, mesh, tuple(lids), folds, d.head_weight(mesh.vertices), self._points_on(mesh),
-                      landmark_weights(d.landmarks, mesh, detail))
+        return _Level(matrix, mesh, tuple(lids), folds, d.head_weight(mesh.vertices))
 
-    def _points_on(self, mesh: Mesh) -> sparse.csr_array:
-        """Return the weights (k, n) of a mesh's vertices that place the feature points on its surface."""
-        d = self._data
+    def _landmark_weights(self, detail: int) -> sparse.csr_array:
+        """Return the weights (k, n) of the vertices of ``mesh(detail)`` that place the landmarks; kept."""
+        mesh = self.mesh(detail)
+        if detail not in self._landmarks_on:
+            self._landmarks_on[detail] = landmark_weights(self._data.landmarks, mesh, detail)
+        return self._landmarks_on[detail]
+
+    def _point_weights(self, detail: int) -> sparse.csr_array:
+        """Return the weights (k, n) of the vertices of ``mesh(detail)`` that place the feature points; kept."""
+        d, mesh = self._data, self.mesh(detail)
+        if detail in self._points_on:
+            return self._points_on[detail]
         weights = sparse.lil_array((len(d.point_names), len(mesh.vertices)))
         for row, (vertex, part) in enumerate(zip(d.point_vertices, d.point_parts, strict=True)):
             if vertex >= 0:             # vertices of the cage keep their index at every level
@@ -340,7 +348,8 @@ class Face:
                 near = attach(self.deformer.points[[row]], mesh.vertices, faces,
                               sparse.csr_array(sparse.identity(len(mesh.vertices), format="csr")))
                 weights[row, near.indices] = near.data
-        return sparse.csr_array(weights)
+        self._points_on[detail] = sparse.csr_array(weights)
+        return self._points_on[detail]
 
 
 def _placed(names: Iterable[str], weights: sparse.csr_array, vertices: Array, detail: int) -> dict[str, Array]:

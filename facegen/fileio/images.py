@@ -5,12 +5,16 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from facegen.errors import FileError, InputError, nearest
-from facegen.fileio.textfile import whole_file
+from facegen.errors import FileError, InputError
+from facegen.fileio.textfile import check_place, whole_file
+
+if TYPE_CHECKING:
+    from PIL.Image import Image
 
 # Pillow's name and settings for each suffix. PNG at level 6: a third smaller than level 1, 15 ms more.
 _FORMATS = {
@@ -31,18 +35,15 @@ def save_image(pixels: ArrayLike, path: str | os.PathLike[str]) -> Path:
     transparency and gets white behind. A fully opaque alpha is dropped. Raises InputError for the pixels,
     FileError for the path.
     """
-    pixels = check_pixels(pixels)
+    pixels = without_full_alpha(check_pixels(pixels))
     path = check_image_path(path)
     kind, settings = _FORMATS[path.suffix.lower()]
-    if pixels.shape[2] == 4 and (pixels[..., 3] == 255).all():
-        pixels = np.ascontiguousarray(pixels[..., :3])
-    elif pixels.shape[2] == 4 and kind == "JPEG":
+    if kind == "JPEG":
         pixels = over_colour(pixels, _PAPER)
 
     from PIL import Image  # lazy: most of facegen works without it
 
-    with whole_file(path, "the picture ") as draft, open(draft, "wb") as file:
-        Image.fromarray(pixels).save(file, kind, **settings)
+    write_whole(Image.fromarray(pixels), path, "picture", kind, **settings)
     return path
 
 
@@ -60,23 +61,26 @@ def save_mask(labels: ArrayLike, path: str | os.PathLike[str]) -> Path:
 
     from PIL import Image
 
-    with whole_file(path, "the mask ") as draft, open(draft, "wb") as file:
-        Image.fromarray(labels).save(file, "PNG", compress_level=6)
+    write_whole(Image.fromarray(labels), path, "mask", compress_level=6)
     return path
 
 
 def check_image_path(path: str | os.PathLike[str]) -> Path:
     """Return a path that a picture can be written to, or raise FileError: ask before long work."""
-    path = Path(path)
-    suffix = path.suffix.lower()
-    if suffix not in _FORMATS:
-        raise FileError(f"{path}: expected a name that ends in {', '.join(_FORMATS)}, "
-                        f"got {suffix or 'no suffix'}{nearest(suffix, _FORMATS) if suffix else ''}")
-    if not path.parent.is_dir():
-        raise FileError(f"{path}: the folder {path.parent} does not exist; make it first")
-    if path.is_dir():
-        raise FileError(f"{path}: is a folder, expected a file")
-    return path
+    return check_place(path, _FORMATS)
+
+
+def write_whole(picture: Image, path: Path, what: str, kind: str = "PNG", **settings: Any) -> None:
+    """Write a Pillow picture, whole; ``what`` is its name in a FileError."""
+    with whole_file(path, f"the {what} ") as draft, open(draft, "wb") as file:
+        picture.save(file, kind, **settings)
+
+
+def without_full_alpha(pixels: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    """Return a picture (h, w, 3) if every pixel of it is opaque, else as it is."""
+    if pixels.shape[2] == 4 and (pixels[..., 3] == 255).all():
+        return np.ascontiguousarray(pixels[..., :3])
+    return pixels
 
 
 def contact_sheet(images: Sequence[ArrayLike], labels: Sequence[str], columns: int = 6, *, gap: int = 8

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from facegen.errors import FileError
+from facegen.errors import FileError, nearest
 
 
 @contextmanager
@@ -26,6 +26,20 @@ def whole_file(path: Path, what: str = "") -> Iterator[Path]:
             draft.unlink(missing_ok=True)
     except OSError as error:
         raise FileError(f"{path}: {what}cannot be written: {error.strerror or error}") from error
+
+
+def check_place(path: str | os.PathLike[str], suffixes: Iterable[str]) -> Path:
+    """Return a path that a file of one of the suffixes can be written to, or raise FileError: ask before long work."""
+    path = Path(path)
+    suffix, suffixes = path.suffix.lower(), list(suffixes)
+    if suffix not in suffixes:
+        raise FileError(f"{path}: expected a name that ends in {', '.join(suffixes)}, "
+                        f"got {suffix or 'no suffix'}{nearest(suffix, suffixes) if suffix else ''}")
+    if not path.parent.is_dir():
+        raise FileError(f"{path}: the folder {path.parent} does not exist; make it first")
+    if path.is_dir():
+        raise FileError(f"{path}: is a folder, expected a file")
+    return path
 
 
 def remove_drafts(paths: Iterable[Path]) -> None:

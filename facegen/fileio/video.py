@@ -17,9 +17,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from facegen.errors import FileError, InputError, nearest
+from facegen.errors import InputError
 from facegen.fileio.images import check_pixels, over_colour
-from facegen.fileio.textfile import whole_file
+from facegen.fileio.textfile import check_place, whole_file
 
 _PAPER = (255, 255, 255)
 # Frames from which a GIF's one palette is made: enough to see every colour of a face, few enough to be quick.
@@ -88,15 +88,7 @@ def check_film(path: str | os.PathLike[str], *, size: tuple[int, int], fps: floa
 
     Raises FileError for the path, InputError for the size, the rate or a missing package.
     """
-    path = Path(path)
-    suffix = path.suffix.lower()
-    if suffix not in FORMATS:
-        raise FileError(f"{path}: expected a name that ends in {', '.join(FORMATS)}, got {suffix or 'no suffix'}"
-                        f"{nearest(suffix, FORMATS) if suffix else ''}")
-    if not path.parent.is_dir():
-        raise FileError(f"{path}: the folder {path.parent} does not exist; make it first")
-    if path.is_dir():
-        raise FileError(f"{path}: is a folder, expected a file")
+    suffix = check_place(path, FORMATS).suffix.lower()
     form = FORMATS[suffix]
     if form.even and any(side % 2 for side in size):
         raise InputError(f"size: {suffix} needs an even width and height, got {size[0]}x{size[1]}; take "

@@ -23,12 +23,17 @@ def digest_of(data: Any) -> str:
 @cache
 def table_digests() -> dict[str, str]:
     """Return file name -> SHA-256 of the tables."""
-    return {name: _of_file(tables_dir() / name) for name in TABLES}
+    return {name: file_digest(tables_dir() / name) for name in TABLES}
 
 
 @cache
 def face_digest(face: str) -> str:
-    """Return the SHA-256 of a face: its ``face.yaml`` and all files that it names. Read once."""
+    """Return the SHA-256 of a face's files. Read once."""
+    return digest_of([file_digest(one) for one in face_files(face)])
+
+
+def face_files(face: str) -> list[Path]:
+    """Return the files of a face, by name or path: its ``face.yaml`` and all that it names."""
     path = meshes_dir() / face / "face.yaml"
     if not path.is_file():
         path = Path(face)
@@ -36,9 +41,10 @@ def face_digest(face: str) -> str:
     data = read_data(path)
     named = {data["cage"], data.get("landmarks", "landmarks.yaml"), *(part["file"] for part in data.get("parts", ()))}
     files = [path, *(path.parent / name for name in sorted(named))]
-    return digest_of([_of_file(one) for one in files if one.is_file()])
+    return [one for one in files if one.is_file()]
 
 
-def _of_file(path: Path) -> str:
+def file_digest(path: Path) -> str:
+    """Return the SHA-256 of a text file."""
     # Line ends are a matter of the checkout, not of the data.
     return hashlib.sha256(path.read_bytes().replace(b"\r\n", b"\n")).hexdigest()

@@ -7,7 +7,6 @@ the film is whole.
 
 from __future__ import annotations
 
-import hashlib
 import json
 import os
 import shutil
@@ -23,15 +22,17 @@ from numpy.typing import ArrayLike, NDArray
 from facegen import __version__
 from facegen.animation.clip import Clip, frame_time
 from facegen.animation.easing import min_jerk
-from facegen.data import meshes_dir, tables_dir
+from facegen.data import tables_dir
 from facegen.errors import FileError, InputError, TableError
-from facegen.face.face import Face, load_face
+from facegen.face.face import Face, face_names, load_face
 from facegen.facs.deformation import Deformation
 from facegen.facs.expressions import Resolution, resolve
 from facegen.facs.yamlfile import read_data
-from facegen.fileio.textfile import make_folder, save_text, whole_file
+from facegen.fileio.images import without_full_alpha, write_whole
+from facegen.fileio.textfile import make_folder, save_text
 from facegen.fileio.video import FORMATS, check_film, save_video
 from facegen.geometry.camera import Camera, check_view, frame
+from facegen.jobs.digests import digest_of, face_files, file_digest
 from facegen.jobs.runner import Report, run, shared
 from facegen.render.backends import choose, warm
 from facegen.render.render import Renderer
@@ -61,10 +62,8 @@ class Shot:
     @cached_property
     def fingerprint(self) -> str:
         """A digest of everything here, and of the tables and the mesh."""
-        content = hashlib.sha256(json.dumps([__version__, _plain(self)], sort_keys=True).encode())
-        for path in (*sorted(tables_dir().glob("*.yaml")), *_face_files(self.face)):
-            content.update(hashlib.sha256(path.read_bytes()).digest())
-        return content.hexdigest()
+        files = (*sorted(tables_dir().glob("*.yaml")), *face_files(self.face))
+        return digest_of([__version__, _plain(self), [file_digest(path) for path in files]])
 
     def prepare(self) -> Callable[[int], NDArray[np.uint8]]:
         """Return what draws frame k; made once in a worker."""
@@ -97,11 +96,8 @@ class FrameTask:
         """Draw it."""
         from PIL import Image
 
-        pixels = shared(self.group, self.shot.prepare)(self.index)
-        if (pixels[..., 3] == 255).all():
-            pixels = np.ascontiguousarray(pixels[..., :3])
-        with whole_file(self.output, "the frame ") as draft, open(draft, "wb") as file:
-            Image.fromarray(pixels).save(file, "PNG", compress_level=_LEVEL)
+        pixels = without_full_alpha(shared(self.group, self.shot.prepare)(self.index))
+        write_whole(Image.fromarray(pixels), self.output, "frame", compress_level=_LEVEL)
 
 
 def save_clip(clip: Clip, path: str | os.PathLike[str], *, fps: float = 25.0, size: int | tuple[int, int] = 512,
@@ -124,14 +120,12 @@ def save_clip(clip: Clip, path: str | os.PathLike[str], *, fps: float = 25.0, si
     if not isinstance(clip, Clip):
         raise InputError(f"clip: expected a Clip, as load_clip and morph make them, got {type(clip).__name__}")
     count = clip.frames(fps)
-    rig, name, mesh, level = _prepared(face, size, view, detail, background, renderer)
+    rig, name, mesh, level, chosen = _prepared(face, size, view, detail, background, renderer, count)
     for raw in clip.raw:
         rig.controls(raw)               # a point that this face lacks is said now
     target = _Target(Path(path), size, fps)
     camera = frame(mesh.vertices, _reach(rig, clip, frame(mesh.vertices, size=size, view=view)), size=size, view=view)
-    shot = Shot(clip, float(fps), count, name, level, background,
-                choose(renderer, pictures=count, pixels=size[0] * size[1]), (camera,))
-    return target.fill(shot, workers, step)
+    return target.fill(Shot(clip, float(fps), count, name, level, background, chosen, (camera,)), workers, step)
 
 
 def save_turn(what: Any, path: str | os.PathLike[str], *, seconds: float = 4.0, fps: float = 25.0,
@@ -156,27 +150,26 @@ def save_turn(what: Any, path: str | os.PathLike[str], *, seconds: float = 4.0, 
         for yaw in (start, end):
             check_view((yaw, pitch))
         yaws = [start + (end - start) * min_jerk(1.0 - abs(1.0 - 2.0 * k / count)) for k in range(count)]
-    rig, name, mesh, level = _prepared(face, size, (yaws[0], pitch), detail, background, renderer)
+    rig, name, mesh, level, chosen = _prepared(face, size, (yaws[0], pitch), detail, background, renderer, count)
     posed = rig.pose(pose, detail=level)
     target = _Target(Path(path), size, fps)
     cameras = _orbit(np.concatenate([mesh.vertices, posed]), size, [(yaw, pitch) for yaw in yaws])
-    chosen = choose(renderer, pictures=count, pixels=size[0] * size[1])
     return target.fill(Shot(pose, float(fps), count, name, level, background, chosen, cameras), workers, step)
 
 
 def _prepared(face: object, size: tuple[int, int], view: tuple[float, float], detail: int | None, background: Any,
-              renderer: str) -> tuple[Face, str, Any, int]:
-    """Return the checked face, its name, its neutral mesh and the level of detail."""
+              renderer: str, count: int) -> tuple[Face, str, Any, int, str]:
+    """Return the checked face, its name, its neutral mesh, the level of detail and the renderer to use."""
     if not isinstance(face, (str, os.PathLike)):
         raise InputError(f"face: expected a name or a path, which every process can load, got {type(face).__name__}")
-    choose(renderer)
+    chosen = choose(renderer, pictures=count, pixels=size[0] * size[1])
     check_look(background=background)
     name = os.fspath(face)
     rig = load_face(name)
-    if _face_path(name) is not None:
+    if name not in face_names():
         name = str(Path(name).resolve())        # workers may have another folder
     mesh, level = neutral_mesh(rig, detail=detail, size=size, view=view, orthographic=False, flat=False, camera=None)
-    return rig, name, mesh, int(level or 0)
+    return rig, name, mesh, int(level or 0), chosen
 
 
 def _reach(rig: Face, clip: Clip, camera: Camera) -> NDArray[np.float64]:
@@ -280,19 +273,6 @@ class _Frames(Sequence):
 
         with Image.open(path) as picture:       # reads the head of the file only
             return picture.mode
-
-
-def _face_path(face: str) -> Path | None:
-    """Return the folder of a face given by path, None for a shipped one."""
-    if (meshes_dir() / face / "face.yaml").is_file() and os.sep not in face:
-        return None
-    path = Path(face)
-    return path if path.is_dir() else path.parent
-
-
-def _face_files(face: str) -> list[Path]:
-    folder = _face_path(face) or meshes_dir() / face
-    return sorted(path for path in folder.iterdir() if path.suffix.lower() in (".yaml", ".obj"))
 
 
 def _plain(value: Any) -> Any:

@@ -23,6 +23,7 @@ from facegen.jobs.runner import shared
 from facegen.jobs.spec import Picture, Settings, thawed
 from facegen.render.lighting import load_light
 from facegen.render.passes import Points, render_passes
+from facegen.render.passfiles import camera_data
 from facegen.render.render import Renderer
 
 IMAGES, MASKS, LABELS = "images", "masks", "labels"
@@ -126,9 +127,7 @@ class PictureTask:
             pose["deformation"] = thawed(p.deformation)
         return {"name": self.name, "file": self.file, "mask": self.mask, "pose": pose, "person": p.person,
                 "intensity": p.intensity, "face": p.face, "light": p.light, "background": p.background,
-                "size": list(p.size), "view": list(p.view), "detail": detail,
-                "camera": {"projection": "orthographic" if camera.orthographic else "perspective",
-                           "extrinsics": camera.extrinsics.tolist(), "intrinsics": camera.intrinsics.tolist()}}
+                "size": list(p.size), "view": list(p.view), "detail": detail, "camera": camera_data(camera)}
 
 
 def picture_tasks(folder: Path, names: list[str], pictures: list[Picture], settings: Settings, *,

@@ -59,8 +59,9 @@ WORK_ROWS = 17
     np.uint64(CHUNK * row) for row in range(WORK_ROWS))
 _CHUNK = np.uint64(CHUNK)
 # Small unsigned numbers, for indices.
-(_P0, _P1, _P2, _P3, _P4, _P5, _P6, _P7, _P8, _P9, _P10, _P11, _P12, _P13, _P14, _P15, _P16, _P17) = (
-    np.uint64(k) for k in range(18))
+(_P0, _P1, _P2, _P3, _P4, _P5, _P6, _P7, _P8, _P9, _P10, _P11, _P12, _P13) = (
+    np.uint64(k) for k in range(14))
+_P16, _P17 = np.uint64(16), np.uint64(17)
 
 
 @njit(**OPTIONS)

@@ -144,10 +144,14 @@ def sequence(count: int) -> NDArray[np.float32]:
 
 def frame_of(way: NDArray[np.float32]) -> NDArray[np.float32]:
     """Return rows (across, along, towards): a frame whose last axis is the direction."""
-    helper = np.array([0, 0, 1], np.float32) if abs(way[2]) < 0.7 else np.array([1, 0, 0], np.float32)
+    return frame_round(way, np.array([0, 0, 1] if abs(way[2]) < 0.7 else [1, 0, 0], np.float32))
+
+
+def frame_round(way: NDArray, helper: NDArray) -> NDArray:
+    """Return rows (across, along, way) of a right-handed frame; across is at right angles to the helper too."""
     across = np.cross(helper, way)
     across /= np.sqrt(across @ across)
-    return np.stack([across, np.cross(way, across), way]).astype(np.float32)
+    return np.stack([across, np.cross(way, across), way])
 
 
 def _cells(local: NDArray[np.float32]) -> tuple[NDArray[np.intp], NDArray[np.float32]]:

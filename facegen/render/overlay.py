@@ -17,10 +17,8 @@ from numpy.typing import NDArray
 from facegen.errors import InputError
 from facegen.geometry.camera import Camera
 from facegen.geometry.mesh import Mesh
-from facegen.render.passes import twice_area
 from facegen.render.request import Rig, check_choice, check_colour
-from facegen.render.soft import nearness_points
-from facegen.render.zbuffer import prepare, scan
+from facegen.render.zbuffer import scan, seen_by, twice_area
 
 LINES = ("mesh", "cage")
 _THINNEST, _THICKEST = 0.2, 50.0
@@ -90,8 +88,7 @@ def draw_wireframe(picture: NDArray[np.uint8], mesh: Mesh, camera: Camera, look:
     met = np.zeros(len(projected), bool)
     met[mesh.faces[sides]] = met[mesh.faces[:, [1, 2, 0]][sides]] = True
     joint = np.where(met[mesh.faces], look.width / 2, -np.inf).astype(np.float32)
-    triangles = prepare(nearness_points(mesh.vertices, camera), mesh.faces, width=camera.width,
-                        height=camera.height, samples=4)
+    triangles = seen_by(camera, mesh, samples=4)
     across = np.array(triangles.sample_x)
     out = picture.copy()
     clear = picture[..., 3] < 255

@@ -27,8 +27,7 @@ from facegen.render.request import (
     neutral_mesh,
     posed_vertices,
 )
-from facegen.render.soft import nearness_points
-from facegen.render.zbuffer import prepare, scan
+from facegen.render.zbuffer import scan, seen_by, twice_area
 
 # Name -> type and value of a pixel that shows nothing.
 _EMPTY: dict[str, tuple[type, float]] = {
@@ -195,8 +194,7 @@ def _arrays(mesh: Mesh, camera: Camera, wanted: list[str], *, flat: bool) -> dic
 
 def _seen(mesh: Mesh, camera: Camera) -> Iterator[tuple[NDArray, NDArray, NDArray]]:
     """Yield rows, columns and the triangles in front of the covered pixels, band by band."""
-    triangles = prepare(nearness_points(mesh.vertices, camera), mesh.faces, width=camera.width,
-                        height=camera.height, samples=1)
+    triangles = seen_by(camera, mesh, samples=1)
     band = max(1, _BAND_PIXELS // camera.width)
     for top in range(0, camera.height, band):
         ids = scan(triangles, top, min(top + band, camera.height))[0][:, 0]
@@ -223,9 +221,3 @@ def _held(weights: NDArray) -> NDArray[np.float64]:
     """Return weights that leave their triangle by no more than the Z-buffer's rounding."""
     weights = np.clip(np.where(np.isnan(weights), 1 / 3, weights), -_SLACK, 1 + _SLACK)
     return weights / weights.sum(axis=1, keepdims=True)
-
-
-def twice_area(projected: NDArray) -> NDArray[np.float64]:
-    """Return twice the signed area, in pixels, of projected triangles (m, 3 corners, 3)."""
-    (ax, ay), (bx, by) = ((projected[:, k, :2] - projected[:, 0, :2]).T for k in (1, 2))
-    return ax * by - bx * ay

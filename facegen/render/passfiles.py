@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from facegen.errors import FileError, InputError
+from facegen.fileio.images import write_whole
 from facegen.fileio.textfile import save_text, whole_file
 from facegen.geometry.camera import Camera
 from facegen.render.passes import POINT_PASSES, Passes, Points, check_passes
@@ -117,8 +118,7 @@ def _save_png(name: str, array: NDArray, passes: Passes, path: Path) -> dict[str
         picture = Image.fromarray(array)
         picture.putpalette([c for colour in colours for c in colour])
         about = {"labels": {label: {"value": k, "colour": list(colours[k])} for k, label in enumerate(names)}}
-    with whole_file(path, f"the {name} pass ") as draft, open(draft, "wb") as file:
-        picture.save(file, "PNG")
+    write_whole(picture, path, f"{name} pass")
     return {"file": path.name, **about}
 
 

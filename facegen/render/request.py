@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from facegen.errors import InputError, nearest
 from facegen.geometry.camera import Camera, frame
 from facegen.geometry.mesh import Mesh
+from facegen.render.zbuffer import twice_area
 
 SMALLEST, LARGEST = 32, 4096
 SHADINGS = ("smooth", "flat")
@@ -192,8 +193,8 @@ def _fitting_detail(rig: Rig, size: tuple[int, int], view: tuple[float, float], 
     if not len(mesh.faces):
         return 0
     camera = camera or frame(mesh.vertices, size=size, view=view, orthographic=orthographic)
-    x, y = np.moveaxis(camera.project(mesh.vertices)[:, :2][mesh.faces], -1, 0)
-    area = ((x[:, 2] - x[:, 0]) * (y[:, 1] - y[:, 0]) - (x[:, 1] - x[:, 0]) * (y[:, 2] - y[:, 0])) / 2
+    corners = camera.project(mesh.vertices)[mesh.faces]
+    area, (x, y, _) = -twice_area(corners) / 2, np.moveaxis(corners, -1, 0)     # y runs down: the seen side is negative
     area = np.sort(area[(area > 0) & (x.max(axis=1) > 0) & (x.min(axis=1) < camera.width)
                         & (y.max(axis=1) > 0) & (y.min(axis=1) < camera.height)])
     if not len(area):

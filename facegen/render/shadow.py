@@ -18,6 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 from facegen.geometry.camera import Camera
 from facegen.geometry.mesh import Mesh
 from facegen.geometry.normals import vertex_normals
+from facegen.render.occlusion import frame_round
 from facegen.render.scene import Scene
 from facegen.render.shading import light_directions
 from facegen.render.zbuffer import prepare, scan
@@ -49,7 +50,8 @@ def shadow(mesh: Mesh, towards: ArrayLike) -> NDArray[np.float32]:
     used = np.unique(mesh.faces)
     if not len(used):
         return np.ones(n, np.float32)
-    axes = _axes(np.asarray(towards, dtype=np.float64))
+    towards = np.asarray(towards, dtype=np.float64)
+    axes = frame_round(towards, np.array([0.0, 1.0, 0.0] if abs(towards[1]) < 0.9 else [0.0, 0.0, 1.0]))
     local = mesh.vertices @ axes.T                                             # across, along, towards the light
     low, high = local[used].min(axis=0), local[used].max(axis=0)
     diagonal = math.sqrt(((high - low) ** 2).sum()) or 1.0
@@ -116,11 +118,3 @@ def _disc(count: int) -> NDArray[np.float64]:
     distance, turn = (k / (count // 2)) ** 0.7, k * math.pi * (3 - math.sqrt(5))
     half = np.stack([distance * np.cos(turn), distance * np.sin(turn)], axis=1)
     return np.concatenate([half, -half, np.zeros((count % 2, 2))])
-
-
-def _axes(towards: NDArray) -> NDArray[np.float64]:
-    """Return rows (across, along, towards) of a right-handed frame whose last axis is the direction."""
-    helper = np.array([0.0, 1.0, 0.0]) if abs(towards[1]) < 0.9 else np.array([0.0, 0.0, 1.0])
-    across = np.cross(helper, towards)
-    across /= math.sqrt(across @ across)
-    return np.stack([across, np.cross(towards, across), towards])

@@ -14,7 +14,7 @@ from facegen.render.request import Look
 from facegen.render.scene import Scene
 from facegen.render.shading import baked_light, from_srgb, shade, surface, to_srgb
 from facegen.render.shadow import with_shadows
-from facegen.render.zbuffer import prepare, scan
+from facegen.render.zbuffer import scan, seen_by
 
 # Samples held at once: the picture is drawn in bands, so that its size does not decide the memory.
 _BAND_SAMPLES = 2**18
@@ -43,7 +43,7 @@ class SoftBackend:
         if look.shadows:
             prepared = replace(prepared, light=with_shadows(prepared.light, mesh, camera, scene))
         width, height = camera.width, camera.height
-        triangles = prepare(nearness_points(mesh.vertices, camera), mesh.faces, width=width, height=height, samples=4)
+        triangles = seen_by(camera, mesh, samples=4)
         picture = np.empty((height, width, 4), np.uint8)
         rows = max(1, _BAND_SAMPLES // (4 * width))
         for top in range(0, height, rows):
@@ -51,18 +51,6 @@ class SoftBackend:
             light, cover = _band(triangles, prepared, camera, scene, top, bottom)
             picture[top:bottom] = _finished(light, cover, self._behind[top:bottom], look.background == "transparent")
         return picture
-
-
-def nearness_points(vertices: NDArray, camera: Camera) -> NDArray[np.float64]:
-    """Return vertices (n, 3) as the Z-buffer wants them: pixels x and y, nearness within 0.01..0.99, NaN before the
-    near plane."""
-    projected = camera.project(vertices)
-    in_front = projected[:, 2] > camera.near
-    near = camera.nearness(projected[:, 2])
-    low, high = (near[in_front].min(), near[in_front].max()) if in_front.any() else (0.0, 1.0)
-    # Kept off 0, which means "nothing" in the buffer.
-    projected[:, 2] = np.where(in_front, 0.01 + 0.98 * (near - low) / max(high - low, 1e-12), np.nan)
-    return projected
 
 
 def _band(triangles, prepared, camera, scene, top, bottom) -> tuple[NDArray[np.float32], NDArray[np.float32]]:

@@ -19,6 +19,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from facegen.geometry.camera import Camera
+from facegen.geometry.mesh import Mesh
+
 SUBPIXELS = 256
 # The samples' x within their pixel, in sub-pixels, one for each sub-row from the top.
 PATTERNS = {1: (128,), 4: (96, 224, 32, 160)}
@@ -50,6 +53,24 @@ class Triangles:
     def sample_x(self) -> tuple[float, ...]:
         """The samples' x within their pixel, 0..1, from the upper sub-row to the lower."""
         return tuple(x / SUBPIXELS for x in PATTERNS[self.samples])
+
+
+def seen_by(camera: Camera, mesh: Mesh, *, samples: int) -> Triangles:
+    """Return a mesh's triangles ready to be scanned for a camera's picture."""
+    return prepare(_nearness_points(mesh.vertices, camera), mesh.faces, width=camera.width, height=camera.height,
+                   samples=samples)
+
+
+def _nearness_points(vertices: NDArray, camera: Camera) -> NDArray[np.float64]:
+    """Return vertices (n, 3) as `prepare` wants them: pixels x and y, nearness within 0.01..0.99, NaN before the
+    near plane."""
+    projected = camera.project(vertices)
+    in_front = projected[:, 2] > camera.near
+    near = camera.nearness(projected[:, 2])
+    low, high = (near[in_front].min(), near[in_front].max()) if in_front.any() else (0.0, 1.0)
+    # Kept off 0, which means "nothing" in the buffer.
+    projected[:, 2] = np.where(in_front, 0.01 + 0.98 * (near - low) / max(high - low, 1e-12), np.nan)
+    return projected
 
 
 def prepare(points: NDArray, faces: NDArray, *, width: int, height: int, samples: int = 4) -> Triangles:
@@ -138,3 +159,9 @@ def _crossing(x0: NDArray, y0: NDArray, x1: NDArray, y1: NDArray, centre: NDArra
     """Return the first pixel whose sample is at or right of the edge (x0, y0)-(x1, y1), y0 < y1: exact."""
     fall = y1 - y0
     return np.ceil(((x0 - shift) * fall + (centre - y0) * (x1 - x0)) / (SUBPIXELS * fall))
+
+
+def twice_area(projected: NDArray) -> NDArray[np.float64]:
+    """Return twice the signed area, in pixels, of projected triangles (m, 3 corners, 3)."""
+    (ax, ay), (bx, by) = ((projected[:, k, :2] - projected[:, 0, :2]).T for k in (1, 2))
+    return ax * by - bx * ay
