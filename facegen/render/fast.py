@@ -26,8 +26,8 @@ from facegen.render.occlusion import (
 from facegen.render.request import Look, available_cores
 from facegen.render.scene import Scene
 from facegen.render.shading import CAVITY, DARKEST, light_directions, material_rows, srgb_table, to_srgb, unit
-from facegen.render.shadow import with_shadows
 from facegen.render.soft import background_rows
+from facegen.render.vertexlight import VertexLight
 
 # Steps of the table for a power of openness; linear between them.
 _POWER_STEPS = 1024
@@ -74,9 +74,7 @@ class FastBackend:
         self._work = np.empty(6 * kernels.CHUNK, np.float32)
         # What each thread works out about the triangles that it sees: planes, and which are done.
         self._scratch = [(np.empty((m, 16), np.float32), np.empty(m, np.uint8)) for _ in range(self._threads)]
-        self._light = np.ones((n, 1 + lights), np.float32)
-        if look.occlusion == "neutral":
-            self._light = self._baked(_own(neutral.vertices))
+        self._light = VertexLight(neutral, camera, scene, look, self._baked)
 
     def draw(self, vertices: NDArray[np.float64]) -> NDArray[np.uint8]:
         """Return the picture (h, w, 4) of checked vertices (n, 3)."""
@@ -86,11 +84,9 @@ class FastBackend:
         items = kernels.bin_triangles(self._faces, self._snapped, self._depth, width, height,
                                       self.neutral.face_materials, self._inside, self._kind, self._first, self._last,
                                       self._starts, self._columns)
-        light = self._baked(vertices) if self.look.occlusion == "posed" else self._light
-        if not (self.look.flat or self.look.occlusion == "posed"):
+        if self._light.posed or not self.look.flat:
             kernels.all_normals(vertices, self._faces, self._work, self._normals)
-        if self.look.shadows:
-            light = with_shadows(light, self.neutral.with_vertices(vertices), self.camera, self.scene)
+        light = self._light.of(vertices, self._normals)
         kernels.fill_attributes(self._normals, light, self._cam, self._attributes)
         picture = self._blank.copy()
 
@@ -106,10 +102,11 @@ class FastBackend:
         self._share_out(bands)
         return picture
 
-    def _baked(self, vertices: NDArray[np.float64]) -> NDArray[np.float32]:
-        """Return each vertex's shares of light (n, 1 + lights); its normal is worked out on the way."""
-        normals = self._normals
-        kernels.all_normals(vertices, self._faces, self._work, normals)
+    def _baked(self, vertices: NDArray[np.float64], normals: NDArray[np.float32] | None) -> NDArray[np.float32]:
+        """Return each vertex's shares of light (n, 1 + lights)."""
+        if normals is None:
+            vertices, normals = _own(vertices), self._normals
+            kernels.all_normals(vertices, self._faces, self._work, normals)
         local = in_cells(vertices)
         points = bake_kernels.surface_points(local, self._faces, _sequence())
         seen = np.empty((len(vertices), DIRECTIONS), np.float32)

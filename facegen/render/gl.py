@@ -36,9 +36,9 @@ from facegen.geometry.normals import face_normals, vertex_normals
 from facegen.render.glsl import fragment_shader, vertex_shader
 from facegen.render.request import Look
 from facegen.render.scene import Scene
-from facegen.render.shading import baked_light, material_rows, to_srgb
-from facegen.render.shadow import with_shadows
+from facegen.render.shading import material_rows, to_srgb
 from facegen.render.soft import background_rows
+from facegen.render.vertexlight import VertexLight
 
 SAMPLES = 4
 # Attributes of a pyrender primitive after position and normal, with their floats: they carry the light shares and
@@ -309,11 +309,10 @@ class GlBackend:
         # Position, normal, light shares, material and what the last attribute has over, as the card reads them.
         self._data = np.zeros((len(self._corners), 6 + sum(size for _, size in slots)), np.float32)
         self._own_light = self._data[:, 6:6 + shares]
-        self._still_light = np.ones((len(neutral.vertices), shares), np.float32)
         self._data[:, 6 + shares] = material
-        if look.occlusion == "neutral":
-            self._still_light = baked_light(neutral, vertex_normals(neutral.vertices, neutral.faces), camera, scene)
-        self._own_light[:] = self._still_light[self._corners]
+        self._light = VertexLight(neutral, camera, scene, look)
+        if self._light.still:
+            self._own_light[:] = self._light.of(neutral.vertices, None)[self._corners]
         self._behind = background_rows(look.background, scene, camera.height)
         materials = material_rows(neutral, scene)
         shaders = (vertex_shader([size for _, size in slots], shares, materials),
@@ -359,19 +358,13 @@ class GlBackend:
         local = (vertices - camera.target) @ camera.rotation.T
         self._lens.hold(camera.distance - local[:, 2])
         data[:, :3] = local[corners]
-        posed = self.look.occlusion == "posed"
-        if posed or not self.look.flat:
-            smooth = vertex_normals(vertices, self.neutral.faces)
+        smooth = vertex_normals(vertices, self.neutral.faces) if self._light.posed or not self.look.flat else None
         if self.look.flat:
             data[:, 3:6] = np.repeat(face_normals(vertices, self.neutral.faces) @ camera.rotation.T, 3, axis=0)
         else:
             data[:, 3:6] = (smooth @ camera.rotation.T)[corners]
-        if posed or self.look.shadows:
-            mesh = self.neutral.with_vertices(vertices)
-            light = baked_light(mesh, smooth, camera, self.scene) if posed else self._still_light
-            if self.look.shadows:
-                light = with_shadows(light, mesh, camera, self.scene)
-            self._own_light[:] = light[corners]
+        if not self._light.still:
+            self._own_light[:] = self._light.of(vertices, smooth)[corners]
 
     def _finished(self, pixels: NDArray[np.float16]) -> NDArray[np.uint8]:
         """Return premultiplied linear light and coverage over the background, in sRGB."""

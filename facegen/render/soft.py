@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -12,8 +10,8 @@ from facegen.geometry.mesh import Mesh
 from facegen.geometry.normals import vertex_normals
 from facegen.render.request import Look
 from facegen.render.scene import Scene
-from facegen.render.shading import baked_light, from_srgb, shade, surface, to_srgb
-from facegen.render.shadow import with_shadows
+from facegen.render.shading import from_srgb, shade, surface, to_srgb
+from facegen.render.vertexlight import VertexLight
 from facegen.render.zbuffer import scan, seen_by
 
 # Samples held at once: the picture is drawn in bands, so that its size does not decide the memory.
@@ -28,20 +26,14 @@ class SoftBackend:
     def __init__(self, neutral: Mesh, camera: Camera, scene: Scene, look: Look) -> None:
         self.neutral, self.camera, self.scene, self.look = neutral, camera, scene, look
         self._behind = background_rows(look.background, scene, camera.height)
-        self._light = None
-        if look.occlusion == "neutral":
-            self._light = baked_light(neutral, vertex_normals(neutral.vertices, neutral.faces), camera, scene)
+        self._light = VertexLight(neutral, camera, scene, look)
 
     def draw(self, vertices: NDArray[np.float64]) -> NDArray[np.uint8]:
         """Return the picture (h, w, 4) of checked vertices (n, 3)."""
         mesh, camera, scene, look = self.neutral.with_vertices(vertices), self.camera, self.scene, self.look
-        light, normals = self._light, None
-        if look.occlusion == "posed":
-            normals = vertex_normals(mesh.vertices, mesh.faces)
-            light = baked_light(mesh, normals, camera, scene)
-        prepared = surface(mesh, camera, scene, flat=look.flat, light=light, normals=normals)
-        if look.shadows:
-            prepared = replace(prepared, light=with_shadows(prepared.light, mesh, camera, scene))
+        normals = vertex_normals(mesh.vertices, mesh.faces) if self._light.posed or not look.flat else None
+        prepared = surface(mesh, camera, scene, flat=look.flat, light=self._light.of(mesh.vertices, normals),
+                           normals=normals)
         width, height = camera.width, camera.height
         triangles = seen_by(camera, mesh, samples=4)
         picture = np.empty((height, width, 4), np.uint8)
