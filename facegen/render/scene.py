@@ -58,7 +58,7 @@ MATERIALS: Mapping[str, Material] = MappingProxyType({
     "teeth": Material((242, 231, 213), 0.15, 60.0, (0.25, 0.2, 0.15), lift=0.72),
     "gums": Material((176, 92, 88), 0.12, 40.0, _WET_WRAP, lift=0.3),
     "tongue": Material((186, 96, 92), 0.10, 30.0, _WET_WRAP, lift=0.12),
-    "mouth": Material((92, 34, 30), 0.05, 30.0),
+    "mouth": Material((92, 34, 30), 0.05, 30.0, lift=0.5),
 })
 
 # A material name that the scene does not know is drawn in plain clay.
