@@ -197,7 +197,7 @@ def test_stale_pictures_are_drawn_again(copied, jobs, monkeypatch):
 def test_line_ends_make_no_other_data(tmp_path):
     (tmp_path / "a").write_bytes(b"x: 1\r\ny: 2\r\n")
     (tmp_path / "b").write_bytes(b"x: 1\ny: 2\n")
-    assert digests.file_digest(tmp_path / "a") == digests._of_file(tmp_path / "b")
+    assert digests.file_digest(tmp_path / "a") == digests.file_digest(tmp_path / "b")
 
 
 def test_a_worker_with_other_data_refuses(tmp_path, jobs, monkeypatch):
