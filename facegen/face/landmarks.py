@@ -58,21 +58,32 @@ def read_landmarks(path: Path, mesh_name: str, n_vertices: int, faces: NDArray[n
     mesh_name, n_vertices, faces (m, 3): the coarse mesh that they are on. parts: what else may carry one.
     Raises TableError (unknown or missing names, indices that the mesh does not have) or FileError.
     """
+    mesh, entries = landmark_entries(path)
+    if mesh is not None and mesh.text() != mesh_name:
+        raise mesh.fail(f"the landmarks are of the mesh '{mesh.text()}', the face uses '{mesh_name}'")
+    return {name: read_landmark(entry, n_vertices, faces, parts) for name, entry in entries.items()}
+
+
+def landmark_entries(path: Path | str) -> tuple[Entry | None, dict[str, Entry]]:
+    """Return what a landmark file says of its mesh (or None) and its landmarks, not yet read, in the order of `NAMES`.
+
+    Raises TableError (unknown names; all missing ones at once) or FileError.
+    """
     top = Entry(read_data(path), str(path)).fields(required=("landmarks",), optional=("mesh", "about", "source"))
-    if "mesh" in top and top["mesh"].text() != mesh_name:
-        raise top["mesh"].fail(f"the landmarks are of the mesh '{top['mesh'].text()}', the face uses '{mesh_name}'")
     found = {}
     for name, entry in top["landmarks"].items():
         if name not in NAMES:
             raise entry.fail(f"unknown landmark '{name}'{nearest(name, NAMES)}")
-        found[name] = _landmark(entry, n_vertices, faces, parts)
-    for name in REQUIRED:
-        if name not in found:
-            raise top["landmarks"].fail(f"the landmark '{name}' is missing")
-    return {name: found[name] for name in NAMES if name in found}
+        found[name] = entry
+    missing = [f"'{name}'" for name in REQUIRED if name not in found]
+    if missing:
+        raise top["landmarks"].fail(f"the landmark{'s' * (len(missing) > 1)} {', '.join(missing)} "
+                                    f"{'are' if len(missing) > 1 else 'is'} missing")
+    return top.get("mesh"), {name: found[name] for name in NAMES if name in found}
 
 
-def _landmark(entry: Entry, n_vertices: int, faces: NDArray[np.int32], parts: Sequence[str]) -> Landmark:
+def read_landmark(entry: Entry, n_vertices: int, faces: NDArray[np.int32], parts: Sequence[str]) -> Landmark:
+    """Return one landmark of a file: a vertex, a point, or a place on a triangle of a mesh."""
     if isinstance(entry.value, list):
         return Landmark(at=entry.vector(_FARTHEST))
     if not isinstance(entry.value, Mapping):
