@@ -19,6 +19,9 @@ from scipy.sparse import csgraph
 # Because the gradient in a sliver is a difference divided by its altitude: an altitude below this share of the longest
 # side counts as this share. Needles would else amplify a motion's noise by their aspect.
 LOWEST_ALTITUDE = 0.02
+# Because two vertices that all but coincide make gradients of any size: a triangle counts as having at least this share
+# of the square of the typical longest side as twice its area.
+_LEAST_AREA = 1e-4
 # Because a triangle without an area, and a side without a length, must add nothing rather than NaN.
 _TINY = 1e-300
 
@@ -42,7 +45,9 @@ class Surface:
         cross = np.cross(b - a, c - a)
         twice = np.sqrt(np.einsum("ij,ij->i", cross, cross))
         longest = np.max([((p - q) ** 2).sum(axis=1) for p, q in ((a, b), (b, c), (c, a))], axis=0)
-        return cross / np.maximum(twice, _TINY)[:, None], twice, np.maximum(twice, LOWEST_ALTITUDE * longest)
+        divisor = np.maximum(twice, LOWEST_ALTITUDE * longest)
+        divisor = np.maximum(divisor, _LEAST_AREA * np.median(longest) if len(longest) else 0.0)
+        return cross / np.maximum(twice, _TINY)[:, None], twice, divisor
 
     @property
     def normals(self) -> NDArray[np.float64]:

@@ -56,8 +56,9 @@ def gradient_transfer(surface: Surface, registered: NDArray, template: Surface, 
     pins = _pins(surface, registered, template, motion)
     matrix = sparse.csc_array(matrix)
     tie = np.zeros(n)
-    tie[pins] = _PIN * matrix.diagonal().mean()
-    tie += 1e-9 * matrix.diagonal().mean()
+    typical = np.median(matrix.diagonal())
+    tie[pins] = _PIN * typical
+    tie += 1e-9 * typical
     factor = Factor(matrix + sparse.diags_array(tie), what="the transfer of gradients")
     gather = sparse.csr_array((np.ones(len(pairs)), (pairs[:, 1], pairs[:, 0])), shape=(m, len(template.faces)))
     result = np.empty((len(motion), n, 3))

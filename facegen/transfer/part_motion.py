@@ -1,9 +1,9 @@
 """How far and in which direction a part's motion goes on another face.
 
 Based on: Onizuka et al. (2018), section 4.3, eq. 16-18: the movement u of a template's landmark becomes A_k R_k u on
-the avatar, where R_k turns the part's direction on the template into that on the avatar, and A_k holds the ratios of the
-part's sizes. Sizes are measured in the part's own axes, so they scale there: movement = R_t A R_s^T u, which for parts
-that face +z is the paper's.
+the avatar, where R_k turns the part's direction on the template into that on the avatar, and A_k holds the ratios of
+the part's sizes. Sizes are measured in the part's own axes, so they scale there: movement = R_t A R_s^T u, which for
+parts that face +z is the paper's.
 
 Where we differ: a part's axes come from pairs of its landmarks (corner to corner, lower to upper), not from the
 smallest singular vector of all of them (eq. 17): a closed mouth is a line, and the normal of a line is arbitrary.

@@ -49,15 +49,6 @@ _HOLD = 1e2
 _LEAST_COSINE = 0.1
 
 
-@dataclass(frozen=True, eq=False)
-class Registration:
-    """Where the avatar's skin lies on the template. ``vertices`` (n, 3): the skin in the template's shape; ``feet``:
-    the nearest place of the template for each of its vertices, -1 where it has none."""
-
-    vertices: NDArray[np.float64]
-    feet: Feet
-
-
 class Correspondence:
     """The search for partners on the template: normal-aware, no crossing of slits, no partner on the border."""
 
@@ -68,6 +59,10 @@ class Correspondence:
         _edges, of_side = template.edges
         border = template.border_edges
         self._border_side = border[of_side].reshape(-1, 3)
+
+    def nearest(self, points: NDArray) -> Feet:
+        """Return the nearest places of all, whatever their normals."""
+        return self._search(points)
 
     def __call__(self, points: NDArray, normals: NDArray, sides: NDArray, *, reach: float,
                  least_cosine: float = _LEAST_COSINE) -> Feet:
@@ -80,8 +75,8 @@ class Correspondence:
 
 
 def register(surface: Surface, sides: NDArray, landmarks: sparse.csr_array, targets: NDArray,
-             correspondence: Correspondence, steps: tuple[Step, ...] = STEPS) -> Registration:
-    """Return the avatar's skin in the template's shape.
+             correspondence: Correspondence, steps: tuple[Step, ...] = STEPS) -> NDArray[np.float64]:
+    """Return the vertices (n, 3) of the avatar's skin in the template's shape.
 
     surface: the skin (n vertices, m triangles), in the template's frame, mm. sides (n, s): `side_fields`. landmarks
     (l, n), targets (l, 3): weights of the vertices that place the landmarks, and the template's. Raises InputError
@@ -91,7 +86,6 @@ def register(surface: Surface, sides: NDArray, landmarks: sparse.csr_array, targ
     smooth, stay = hinge_energy(surface), dirichlet(surface)
     area = np.maximum(surface.vertex_areas, 1e-6 * surface.vertex_areas.mean())
     x = surface.vertices.copy()
-    feet = None
     for step in steps:
         for _ in range(step.repeat):
             pull = np.zeros(n)
@@ -109,5 +103,4 @@ def register(surface: Surface, sides: NDArray, landmarks: sparse.csr_array, targ
             right += hold * (landmarks.T @ (targets - landmarks @ surface.vertices))
             u = Factor(matrix, what="the registration of the avatar").solve(right)
             x = surface.vertices + u
-    feet = correspondence(x, vertex_normals(x, surface.faces), sides, reach=steps[-1].reach)
-    return Registration(x, feet)
+    return x
