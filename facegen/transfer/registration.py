@@ -1,0 +1,106 @@
+"""Deform the avatar's skin into the template's shape.
+
+Based on: Onizuka et al. (2018), section 4.2, eq. 10-13: minimise ws ES + wi EI + wc EC with the landmarks on the
+template's. ES is smoothness, EI keeps the shape, EC draws every vertex to the nearest place of the template. In terms
+of the displacement u = x - x0 and its gradient in the triangles' planes, T - I = grad u:
+
+    ES = integral |second derivative of u|^2     (eq. 10, as the jumps of grad u across edges)
+    EI = integral |grad u|^2                     (eq. 12)
+    EC = integral |x - c(x)|^2                   (eq. 13)
+
+Integrals over the surface, not sums over its triangles: a finer mesh of the same face is registered alike. Where we
+differ from the paper: c(x) lies on the surface, not at a vertex; more and gentler steps; no partner across a slit or
+beyond the template's border.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from facegen.geometry.closest import ClosestPoints, Feet
+from facegen.geometry.factor import Factor
+from facegen.geometry.normals import vertex_normals
+from facegen.geometry.operators import Surface, dirichlet, hinge_energy
+
+
+@dataclass(frozen=True)
+class Step:
+    """One solve or more with the same weights. smooth (mm^2), stay, close (1 / mm^2): ws, wi, wc; reach (mm): partners
+    farther away are no partners."""
+
+    smooth: float
+    stay: float
+    close: float
+    reach: float
+    repeat: int = 1
+
+
+STEPS = (Step(40.0, 0.02, 0.0, 0.0), Step(40.0, 0.01, 0.002, 40.0, 3), Step(20.0, 0.003, 0.01, 25.0, 3),
+         Step(10.0, 0.001, 0.05, 15.0, 2), Step(5.0, 0.0, 0.2, 10.0, 3))
+"""From stiff to close, in the working frame: a human-sized head in millimetres."""
+
+# How firmly a landmark is held, times the largest diagonal entry: it lands within a hundredth of a millimetre.
+_HOLD = 1e2
+# Because normals of the registered skin are those of a rough draft at first: this is wider than the final match.
+_LEAST_COSINE = 0.1
+
+
+class Correspondence:
+    """The search for partners on the template: normal-aware, no crossing of slits, no partner on the border."""
+
+    def __init__(self, template: Surface, sides: NDArray) -> None:
+        self.template = template
+        self._search = ClosestPoints(template)
+        self._sides = sides[template.faces].mean(axis=1)
+        _edges, of_side = template.edges
+        border = template.border_edges
+        self._border_side = border[of_side].reshape(-1, 3)
+
+    def nearest(self, points: NDArray) -> Feet:
+        """Return the nearest places of all, whatever their normals."""
+        return self._search(points)
+
+    def __call__(self, points: NDArray, normals: NDArray, sides: NDArray, *, reach: float,
+                 least_cosine: float = _LEAST_COSINE) -> Feet:
+        """Return the feet; those beyond reach (mm) or on the template's border count as none."""
+        feet = self._search(points, normals, least_cosine=least_cosine, labels=(sides, self._sides))
+        beyond = ~(feet.distances <= reach)
+        on_side = feet.weights[:, [2, 0, 1]] < 1e-9         # no weight of the corner opposite side k
+        beyond |= feet.found & (on_side & self._border_side[feet.faces]).any(axis=1) & (feet.distances > 1e-6)
+        return Feet(np.where(beyond, -1, feet.faces), feet.weights, feet.points, feet.distances)
+
+
+def register(surface: Surface, sides: NDArray, landmarks: sparse.csr_array, targets: NDArray,
+             correspondence: Correspondence, steps: tuple[Step, ...] = STEPS) -> NDArray[np.float64]:
+    """Return the vertices (n, 3) of the avatar's skin in the template's shape.
+
+    surface: the skin (n vertices, m triangles), in the template's frame, mm. sides (n, s): `side_fields`. landmarks
+    (l, n), targets (l, 3): weights of the vertices that place the landmarks, and the template's. Raises InputError
+    where the system is singular.
+    """
+    n = len(surface.vertices)
+    smooth, stay = hinge_energy(surface), dirichlet(surface)
+    area = np.maximum(surface.vertex_areas, 1e-6 * surface.vertex_areas.mean())
+    x = surface.vertices.copy()
+    for step in steps:
+        for _ in range(step.repeat):
+            pull = np.zeros(n)
+            goal = x
+            if step.close:
+                feet = correspondence(x, vertex_normals(x, surface.faces), sides, reach=step.reach)
+                # Near the reach a partner counts less: one that comes and goes would make steps jump.
+                fade = np.where(feet.found, 1 - np.minimum(feet.distances / max(step.reach, 1e-9), 1) ** 2, 0.0)
+                pull, goal = step.close * area * fade, np.where(feet.found[:, None], feet.points, x)
+            energy = step.smooth * smooth + step.stay * stay
+            floor = 1e-9 * energy.diagonal().mean()
+            hold = _HOLD * energy.diagonal().max()
+            matrix = energy + sparse.diags_array(pull + floor) + hold * (landmarks.T @ landmarks)
+            right = pull[:, None] * (goal - surface.vertices)
+            right += hold * (landmarks.T @ (targets - landmarks @ surface.vertices))
+            u = Factor(matrix, what="the registration of the avatar").solve(right)
+            x = surface.vertices + u
+    return x

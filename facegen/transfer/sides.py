@@ -1,0 +1,51 @@
+"""Which side of a slit a place of the skin lies on: above or below the mouth, above or below each eye's opening.
+
+Closed lips touch, so that the nearest place of a lower lip may lie on the upper one. A field that is one at the
+landmarks above the slit and minus one at those below, and smooth along the skin, tells them apart (the paper trusts
+normals alone: section 4.2).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from facegen.geometry.factor import Factor
+from facegen.geometry.operators import Surface, dirichlet
+
+SLITS = (
+    (("mouth_inner_top", "mouth_top", "mouth_upper_L", "mouth_upper_R"),
+     ("mouth_inner_bottom", "mouth_bottom", "mouth_lower_L", "mouth_lower_R"), ("mouth_corner_L", "mouth_corner_R")),
+    *((tuple(f"{name}_{side}" for name in ("eye_upper", "eye_upper_inner", "eye_upper_outer")),
+       tuple(f"{name}_{side}" for name in ("eye_lower", "eye_lower_inner", "eye_lower_outer")),
+       (f"eye_inner_{side}", f"eye_outer_{side}")) for side in "LR"),
+)
+"""For each slit the landmarks above, below and at its corners."""
+
+# Millimetres along the skin over which a side fades: about the height of a lip, so that a cheek has no side.
+_REACH = 12.0
+# How firmly a landmark holds the field: far above the stiffness of a vertex, about one.
+_HOLD = 1e3
+
+
+def side_fields(surface: Surface, places: Mapping[str, tuple[NDArray, NDArray]]) -> NDArray[np.float64]:
+    """Return, for every vertex (n, slits), a number from -1 (below) to 1 (above); 0 far from the slit.
+
+    places: landmark -> vertices (3,) and their weights (3,).
+    """
+    n = len(surface.vertices)
+    matrix = dirichlet(surface) + sparse.diags_array(np.maximum(surface.vertex_areas, 1e-9) / _REACH**2)
+    held, sides = sparse.csc_array((n, n)), np.zeros((n, len(SLITS)))
+    for slit, (above, below, corners) in enumerate(SLITS):
+        for names, value in ((above, 1.0), (below, -1.0), (corners, 0.0)):
+            for name in names:
+                if name in places:
+                    vertices, weights = places[name]
+                    row = sparse.csr_array((weights, (np.zeros(3, int), vertices)), shape=(1, n))
+                    held = held + _HOLD * (row.T @ row)
+                    sides[vertices, slit] += _HOLD * weights * value
+    # A hold of one slit also holds the others' fields at zero there: they are far from each other.
+    return Factor(matrix + held, what="which side of a slit the skin lies on").solve(sides)

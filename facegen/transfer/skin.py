@@ -1,0 +1,166 @@
+"""An avatar's skin laid on a template: everything of a transfer that does not depend on the shapes.
+
+The steps in their order, each a function of its own: sides of the slits, registration (Onizuka 2018, eq. 10-13), a
+finer copy where needed, correspondence, part motion (eq. 16-18), the jaw, and the factored system (eq. 19).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from facegen.geometry.closest import Feet
+from facegen.geometry.normals import vertex_normals
+from facegen.geometry.operators import Surface
+from facegen.transfer.baselines import PAPER, SUMNER, PaperWeights, expression_cloning, gradient_transfer
+from facegen.transfer.jaw import JawMotion, avatar_jaw, jaw_share
+from facegen.transfer.part_motion import MEMBERS, PartMotion, part_motion, spread
+from facegen.transfer.refine import refine
+from facegen.transfer.registration import Correspondence, register
+from facegen.transfer.sides import side_fields
+from facegen.transfer.solve import OURS, Transfer, Weights, landmark_matrix
+from facegen.transfer.template import Template, placing
+
+METHODS = ("landmarks", "sumner", "cloning")
+
+# Millimetres: partners farther than this are none once the skin is registered.
+_REACH = 10.0
+# A side's bending is measured on so many shapes at a time, to bound the memory.
+_AT_A_TIME = 16
+# Above this many triangles the avatar is as fine as the template everywhere that matters: the search is left out.
+_FINE_ENOUGH = 60_000
+
+
+@dataclass(frozen=True, eq=False)
+class Skin:
+    """``surface`` of n vertices, ``places`` of its landmarks (vertices (3,), weights (3,)), and ``registered`` (n, 3):
+    the same vertices in the template's shape. All in the template's frame, mm."""
+
+    template: Template
+    surface: Surface
+    places: Mapping[str, tuple[NDArray, NDArray]]
+    sides: NDArray[np.float64]
+    registered: NDArray[np.float64]
+    correspondence: Correspondence
+    opening: float = 1.0
+
+    @cached_property
+    def landmarks(self) -> dict[str, NDArray]:
+        """Places (3,) of the landmarks."""
+        return {name: weights @ self.surface.vertices[rows] for name, (rows, weights) in self.places.items()}
+
+    @cached_property
+    def feet(self) -> Feet:
+        """The template's partner of each vertex."""
+        return self.correspondence(self.registered, vertex_normals(self.registered, self.surface.faces), self.sides,
+                                   reach=_REACH)
+
+    @cached_property
+    def parts(self) -> PartMotion:
+        """How a part's motion goes on this avatar."""
+        return part_motion(self.template.landmarks, self.landmarks)
+
+    @cached_property
+    def jaw_share(self) -> NDArray[np.float64]:
+        """How much of the jaw's motion each vertex takes (n,)."""
+        return jaw_share(self.surface, self.feet, self.template.surface.faces, self.template.jaw_share, self.sides,
+                         self.places)
+
+    @cached_property
+    def jaw(self) -> JawMotion | None:
+        """The avatar's jaw; None if the template knows of none."""
+        if self.template.hinge is None:
+            return None
+        return avatar_jaw(self.template.hinge, self.template.landmarks, self.landmarks, self.registered,
+                          self.surface.vertices, self.jaw_share, opening=self.opening)
+
+    def motion(self, method: str = "landmarks", weights: Weights | PaperWeights | None = None) -> NDArray[np.float64]:
+        """Return the displacements (k, n, 3) of the template's shapes on this skin, mm."""
+        template = self.template
+        if method == "cloning":
+            return expression_cloning(self.surface, self.registered, template.surface, self.feet, template.motion)
+        if method == "sumner" or isinstance(weights, PaperWeights):
+            chosen = SUMNER if method == "sumner" else weights or PAPER
+            places, matrix = self._landmark_motion()
+            k = len(template.motion)
+            moved = (matrix @ template.motion.reshape(k, -1).T).T.reshape(k, -1, 3)
+            return gradient_transfer(self.surface, self.registered, template.surface, template.motion, weights=chosen,
+                                     landmarks=places, landmark_motion=moved, root=method == "sumner")
+        result = self._solver(weights or OURS).solve(self._without_jaw())[:, :len(self.surface.vertices)]
+        if self.jaw is not None:
+            for some in _blocks(len(result)):
+                turned = self.jaw.movement(self.surface.vertices, template.jaw[some])
+                result[some] += self.jaw_share[:, None] * turned
+        return result
+
+    def _without_jaw(self) -> NDArray[np.float64]:
+        """Return the template's displacements without what its jaw alone would do."""
+        template = self.template
+        if template.hinge is None:
+            return template.motion
+        turned = template.hinge.movement(template.surface.vertices, template.jaw)
+        return template.motion - template.jaw_share[None, :, None] * turned
+
+    def _landmark_motion(self):
+        """Return the weights (l, n) that place the parts' landmarks, and the matrix that moves them (eq. 16)."""
+        names = tuple(name for members in MEMBERS.values() for name in members
+                      if name in self.places and name in self.template.places)
+        part = {name: part for part, members in MEMBERS.items() for name in members}
+        matrices = np.array([self.parts.matrices[part[name]] for name in names])
+        return (placing(self.places, names, len(self.surface.vertices)),
+                landmark_matrix(self.template.places, names, matrices, len(self.template.surface.vertices)))
+
+    def _solver(self, weights: Weights) -> Transfer:
+        """Return the factored system, on a finer copy of the skin where the template bends more than it can."""
+        template, surface, registered = self.template, self.surface, self.registered
+        motion = self._without_jaw()
+        sides, feet = self.sides, self.feet
+        places, matrix = self._landmark_motion()
+        if len(surface.faces) < _FINE_ENOUGH:
+            fine, fine_registered, made_of = refine(surface, registered, lambda a, b: self._bend(motion, a, b))
+            if len(fine.vertices) > len(surface.vertices):
+                surface, registered, sides = fine, fine_registered, made_of @ sides
+                feet = self.correspondence(registered, vertex_normals(registered, surface.faces), sides, reach=_REACH)
+                places.resize((places.shape[0], len(surface.vertices)))
+        shape = Surface(registered, surface.faces)
+        middles = self.correspondence(shape.corners.mean(axis=1), shape.normals, sides[surface.faces].mean(axis=1),
+                                      reach=_REACH)
+        matrices, turns = spread(self.parts, template.landmarks, registered)
+        return Transfer(surface, template.surface, feet, middles, matrices, turns, places, matrix, weights)
+
+    def _bend(self, motion: NDArray, a: NDArray, b: NDArray) -> NDArray[np.float64]:
+        """Return how far the motion of the middles of sides a-b is from the mean of their ends', at most, mm."""
+        template = self.template.surface
+        ends_and_middle = self.correspondence.nearest(np.concatenate([a, b, (a + b) / 2]))
+        faces, weights = template.faces[ends_and_middle.faces], ends_and_middle.weights
+        most = np.zeros(len(a))
+        for some in _blocks(len(motion)):
+            at = np.einsum("pc,kpci->kpi", weights, motion[some][:, faces])
+            one, other, middle = np.split(at, 3, axis=1)
+            most = np.maximum(most, np.sqrt(((middle - (one + other) / 2) ** 2).sum(axis=2)).max(axis=0))
+        return most
+
+
+def lay_skin(template: Template, surface: Surface, places: Mapping[str, tuple[NDArray, NDArray]], *,
+             opening: float = 1.0, registered: NDArray | None = None) -> Skin:
+    """Return the avatar's skin laid on the template.
+
+    surface: the skin in the template's frame, mm. places: its landmarks. registered: from an earlier call with the same
+    skin, landmarks and template, to save the time. Raises InputError where the mesh cannot be solved.
+    """
+    correspondence = Correspondence(template.surface, side_fields(template.surface, template.places))
+    sides = side_fields(surface, places)
+    if registered is None:
+        names = [name for name in places if name in template.places]
+        targets = np.array([template.landmarks[name] for name in names])
+        registered = register(surface, sides, placing(places, names, len(surface.vertices)), targets,
+                              correspondence)
+    return Skin(template, surface, places, sides, registered, correspondence, opening)
+
+
+def _blocks(k: int):
+    return [slice(start, start + _AT_A_TIME) for start in range(0, k, _AT_A_TIME)]

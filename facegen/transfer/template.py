@@ -1,0 +1,93 @@
+"""The source of a transfer: a neutral skin, its landmarks, and how it moves in every shape.
+
+The parametric face knows more of a shape than its vertices: how far the jaw turned and where the eyes look. A template
+from a file knows its vertices only.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from facegen.face.deformer import Jaw
+from facegen.face.face import Controls, Face
+from facegen.facs.deformation import Deformation
+from facegen.geometry.closest import ClosestPoints
+from facegen.geometry.mesh import Mesh
+from facegen.geometry.operators import Surface
+
+DETAIL = 2
+"""Subdivision level of the template: about 11,000 triangles, 4 mm long."""
+
+_TEST_OPENING = 10.0    # degrees: the jaw's share of a vertex is read off a pose with the jaw this far open
+
+
+@dataclass(frozen=True, eq=False)
+class Template:
+    """A neutral skin of n vertices (mm) and its k shapes.
+
+    ``landmarks``: name -> place (3,); ``places``: name -> vertices (3,) of the skin and their weights (3,). ``motion``
+    (k, n, 3) mm. ``jaw`` (k, 3): opening in degrees, side and forward in mm; ``gaze`` (k, 4): yaw and pitch in degrees,
+    left eye then right. ``hinge``: how the jaw moves; ``jaw_share`` (n,): how much of it each vertex takes. ``rest``:
+    all parts' neutral, or None, and ``rest_motion`` (k, r, 3) of its vertices.
+    """
+
+    name: str
+    surface: Surface
+    landmarks: Mapping[str, NDArray]
+    places: Mapping[str, tuple[NDArray, NDArray]]
+    names: tuple[str, ...]
+    motion: NDArray[np.float64]
+    jaw: NDArray[np.float64]
+    gaze: NDArray[np.float64]
+    hinge: Jaw | None
+    jaw_share: NDArray[np.float64]
+    rest: Mesh | None = None
+    rest_motion: NDArray[np.float64] | None = None
+
+    @property
+    def height(self) -> float:
+        """Height of the head, mm."""
+        return float(np.ptp(self.surface.vertices[:, 1]))
+
+
+def places_on(surface: Surface, points: Mapping[str, NDArray]) -> dict[str, tuple[NDArray, NDArray]]:
+    """Return for every point the vertices (3,) and weights (3,) of the nearest place on the surface."""
+    feet = ClosestPoints(surface)(np.array(list(points.values())))
+    return {name: (surface.faces[face], weights)
+            for name, face, weights in zip(points, feet.faces, feet.weights, strict=True)}
+
+
+def placing(places: Mapping[str, tuple[NDArray, NDArray]], names: Sequence[str], n: int) -> sparse.csr_array:
+    """Return the weights (len(names), n) of the vertices that place the landmarks."""
+    rows = np.repeat(np.arange(len(names)), 3)
+    columns = np.concatenate([places[name][0] for name in names]) if names else np.zeros(0, int)
+    values = np.concatenate([places[name][1] for name in names]) if names else np.zeros(0)
+    return sparse.csr_array((values, (rows, columns)), shape=(len(names), n))
+
+
+def template_of(face: Face, shapes: Mapping[str, Deformation], *, detail: int = DETAIL) -> Template:
+    """Return the parametric face as a template of the named deformations."""
+    mesh = face.mesh(detail)
+    skin = mesh.part_vertices(mesh.parts[0])
+    n = int(skin[-1]) + 1                                   # the skin comes first, all of its vertices are used
+    surface = Surface(mesh.vertices[:n], mesh.faces[mesh.face_parts == 0])
+    points = {name: at for name, at in face.landmark_points(mesh.vertices, detail=detail).items()
+              if not name.startswith("eye_center")}
+    places = places_on(surface, points)
+    each = [face.controls(deformation) for deformation in shapes.values()]
+    together = Controls(*(np.stack([getattr(c, field) for c in each])
+                          for field in ("vectors", "jaw", "lids", "eyes", "head", "folds")))
+    motion = face.pose_controls(together, detail=detail) - mesh.vertices
+    hinge = face.deformer.jaw
+    opened = np.array([_TEST_OPENING, 0.0, 0.0])
+    test = face.pose({"units": "millimetre", "jaw": {"open": _TEST_OPENING}}, detail=detail)[:n] - surface.vertices
+    turned = hinge.movement(surface.vertices, opened)
+    share = np.clip((test * turned).sum(axis=1) / np.maximum((turned**2).sum(axis=1), 1e-12), 0.0, 1.0)
+    return Template(face.name, surface, {name: places[name][1] @ surface.vertices[places[name][0]] for name in points},
+                    places, tuple(shapes), motion[:, :n], together.jaw, together.eyes, hinge, share,
+                    mesh, motion)
