@@ -144,9 +144,8 @@ class Face:
         cannot be understood.
         """
         found = self.resolve(what, person=person, intensity=intensity)
-        whole = weighted_sum([(1.0, self._in_millimetres(one)) for one in (found.deformation, *found.more)]) \
-            if found.more else found.deformation
-        return self.pose_controls(self.controls(whole, strict=not found.units), detail=detail)
+        controls = self.controls(found.deformation, *found.more, strict=not found.units)
+        return self.pose_controls(controls, detail=detail)
 
     def resolve(self, what: Any, *, person: Any = None, intensity: float = 1.0) -> Resolution:
         """Return the chain name -> units -> deformation data (Akimoto 1986, fig. 10).
@@ -157,12 +156,14 @@ class Face:
             return what
         return resolve(what, person=person, intensity=intensity)
 
-    def controls(self, deformation: Deformation, *, strict: bool = True) -> Controls:
-        """Return the deformer's input, mm and degrees, for deformation data in its own units.
+    def controls(self, deformation: Deformation, *more: Deformation, strict: bool = True) -> Controls:
+        """Return the deformer's input, mm and degrees, for deformation data in its own units, or the sum of several.
 
         A feature point or fold that this face lacks, or a point that takes no input, is an InputError; with
         ``strict=False`` it is passed over: a face of fifteen points takes of the common tables what it can.
         """
+        if more:
+            deformation = weighted_sum([(1.0, self._in_millimetres(one)) for one in (deformation, *more)])
         d = self._data
         scale, mouth = self._lengths(deformation.units)
         vectors = np.zeros((len(d.point_names), 3))

@@ -23,8 +23,8 @@ SLITS = (
        tuple(f"{name}_{side}" for name in ("eye_lower", "eye_lower_inner", "eye_lower_outer")),
        (f"eye_inner_{side}", f"eye_outer_{side}")) for side in "LR"),
 )
-"""For each slit the landmarks above, below and at its corners. The inner edges of the lips are not among them: where lips
-touch, a person who sets points cannot see on which lip a point lands (see `settled`)."""
+"""For each slit the landmarks above, below and at its corners. The inner edges of the lips are not among them: where
+lips touch, a person who sets points cannot see on which lip a point lands (see `settled`)."""
 
 _INNER = {"mouth_inner_top": 1.0, "mouth_inner_bottom": -1.0}
 # Because a point on the wrong lip belongs to a vertex about as near on the other: not farther than this, in mm.

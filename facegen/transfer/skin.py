@@ -146,7 +146,7 @@ class Skin:
         most = abs(difference) @ reach
         mobile = np.flatnonzero(most > BEND)
         most[mobile] = 0.0
-        for some in _blocks(len(motion)):
+        for some in _blocks(len(motion) if len(mobile) else 0):
             moved = difference[mobile] @ np.moveaxis(motion[some], 0, 1).reshape(n, -1)
             length = np.sqrt((moved.reshape(len(mobile), -1, 3) ** 2).sum(axis=2))
             most[mobile] = np.maximum(most[mobile], length.max(axis=1))

@@ -34,8 +34,8 @@ from facegen.geometry.operators import Surface, dirichlet, hinge_energy
 _ALONE = 0.05
 # Because each piece that no partner holds would float: everything is tied to its place this much, times the diagonal.
 _TIE = 1e-7
-# A vertex without a partner, in a mouth's lining or on a body, stays where it is with this share of the anchor's weight:
-# the lips' motion is gone two centimetres into the mouth and does not push its walls through the cheeks.
+# A vertex without a partner, in a mouth's lining or on a body, stays where it is with this share of the anchor's
+# weight: the lips' motion is gone two centimetres into the mouth and does not push its walls through the cheeks.
 _STAY = 0.3
 # Millimetres over which the trust in a partner fades.
 _FADE = 6.0
