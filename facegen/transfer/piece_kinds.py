@@ -41,6 +41,8 @@ _EYE_NEAR, _EYE_SIZE = 0.9, 1.6
 _STRIP, _SPOT = 0.42, 0.5
 # Thin: nine tenths of its vertices within this share of the face's height of the skin; touching: a tenth of them.
 _THIN, _TOUCHES = 0.09, 0.05
+# Both rows of teeth in one piece: the lip line leaves at least this share of its height on either side.
+_ROWS = 0.3
 # Wider than the brows by this, it goes round the head.
 _ROUND_HEAD = 1.25
 
@@ -297,7 +299,7 @@ def _mouth_kinds(parts: Components, which: list[int], face: Face) -> dict[int, t
             result[c] = ("mouth", "named")
         elif said != "teeth" and both and (held >= 2 or held == len(which) - 1) and _large(boxes[c], face):
             result[c] = ("mouth", "round what lies behind the lips")
-        elif said == "teeth" and both and not row and _large(boxes[c], face) and min(h.max(), -h.min()) > 0.3 * np.ptp(h):
+        elif said == "teeth" and both and not row and min(h.max(), -h.min()) > _ROWS * np.ptp(h):
             result[c] = ("mouth", "both rows of teeth in one: the lower half goes with the jaw")
         elif row:
             result[c] = (f"teeth_{row}", f"named '{row}'")

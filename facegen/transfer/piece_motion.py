@@ -23,7 +23,7 @@ from facegen.transfer.pieces import Piece
 Array = NDArray[np.float64]
 
 # A lining's jaw share goes from none to all over this share of its height, from the lip line both ways.
-_BLEND = 0.5
+_BLEND = 0.35
 # Its rim follows the lips within this share of the face's height: three millimetres on a person.
 _RIM = 0.03
 
@@ -51,25 +51,23 @@ class RigidMotions:
 class PieceMotion:
     """Moves the pieces of one avatar; everything that no shape changes is computed once."""
 
-    def __init__(self, pieces: Sequence[Piece], vertices: ArrayLike, faces: ArrayLike, points: Mapping[str, ArrayLike],
-                 *, hinge: ArrayLike | None = None) -> None:
-        """pieces: `find_pieces` of vertices (n, 3), mm, in the template's frame, and faces (m, 3). points: landmarks.
-        hinge (3,): a place on the jaw's axis, which divides a mouth's lining; without one the lip line does."""
+    def __init__(self, pieces: Sequence[Piece], vertices: ArrayLike, faces: ArrayLike,
+                 points: Mapping[str, ArrayLike]) -> None:
+        """pieces: `find_pieces` of vertices (n, 3), mm, in the template's frame, and faces (m, 3). points: landmarks."""
         self.pieces = tuple(pieces)
-        self.vertices, faces = np.asarray(vertices, float), np.asarray(faces, np.int64)
-        places = {name: np.asarray(place, float) for name, place in points.items()}
-        face = Face(places)
-        skin = Surface(self.vertices, np.concatenate(
+        self.vertices, self.faces = np.asarray(vertices, float), np.asarray(faces, np.int64)
+        faces = self.faces
+        self.face = face = Face({name: np.asarray(place, float) for name, place in points.items()})
+        self.skin = skin = Surface(self.vertices, np.concatenate(
             [faces[piece.faces] for piece in pieces if piece.kind == "skin"] or [np.empty((0, 3), np.int64)]))
         if not len(skin.faces):
             raise InputError("pieces: expected a piece of the kind 'skin'")
-        self._with_jaw = self._rows("teeth_lower", "tongue")
-        self._tongue = self._rows("tongue")
-        self.eyes = {s: self._eye(s, faces, face) for s in "LR" if len(self._rows(f"eye_{s}"))}
+        self._with_jaw = self.rows("teeth_lower", "tongue")
+        self._tongue = self.rows("tongue")
+        self.eyes = {s: self._eye(s, faces, face) for s in "LR" if len(self.rows(f"eye_{s}"))}
         thin = [(piece.vertices, faces[piece.faces]) for piece in pieces if piece.kind == "carried"]
         self._carried = Carried(skin, thin, face.height) if thin else None
-        up = _jaw_plane(face, hinge)
-        self._linings = [_Lining(piece, self.vertices, skin, face, up) for piece in pieces if piece.kind == "mouth"]
+        self._linings = [_Lining(piece, self.vertices, skin, face) for piece in pieces if piece.kind == "mouth"]
 
     def move(self, skin_motion: ArrayLike, jaw: RigidMotions | None = None, gaze: ArrayLike | None = None, *,
              tongue: ArrayLike | None = None) -> NDArray[np.float64]:
@@ -96,7 +94,7 @@ class PieceMotion:
                 raise InputError(f"gaze: expected shape ({k}, 4), got {angles.shape}")
             for s, ball in self.eyes.items():
                 yaw, pitch = angles[:, :2].T if s == "L" else angles[:, 2:].T
-                rows, turning = self._rows(f"eye_{s}"), (yaw != 0) | (pitch != 0)
+                rows, turning = self.rows(f"eye_{s}"), (yaw != 0) | (pitch != 0)
                 motion[np.ix_(turning, rows)] = ball.turned(yaw[turning], pitch[turning], self.vertices[rows])
         if tongue is not None:
             extra = np.asarray(tongue, float)
@@ -109,7 +107,8 @@ class PieceMotion:
             motion[:, self._carried.rows] = self._carried.move(motion)
         return motion
 
-    def _rows(self, *kinds: str) -> NDArray[np.int64]:
+    def rows(self, *kinds: str) -> NDArray[np.int64]:
+        """Return the vertices of all pieces of some kinds."""
         return np.concatenate([p.vertices for p in self.pieces if p.kind in kinds] or [np.empty(0, np.int64)])
 
     def _eye(self, s: str, faces: NDArray, face: Face) -> Eyeball:
@@ -122,22 +121,13 @@ class PieceMotion:
                        pupil=face.points.get(f"eye_center_{s}"))
 
 
-def _jaw_plane(face: Face, hinge: ArrayLike | None) -> Array:
-    """Return the direction (3,) up from the plane that divides what goes with the jaw from what keeps still."""
-    if hinge is None:
-        return face.lip_normal
-    up = np.cross(face.lips - np.asarray(hinge, float), [1.0, 0.0, 0.0])
-    length = float(np.linalg.norm(up))
-    return up / length if length > 0 else face.lip_normal
-
-
 class _Lining:
     """A mouth's lining, or both rows of teeth in one piece: below the lip line with the jaw, above it still."""
 
-    def __init__(self, piece: Piece, vertices: Array, skin: Surface, face: Face, up: Array) -> None:
+    def __init__(self, piece: Piece, vertices: Array, skin: Surface, face: Face) -> None:
         self.rows = piece.vertices
         self._at = vertices[self.rows]
-        height = (self._at - face.lips) @ up
+        height = (self._at - face.lips) @ face.lip_normal
         reach = _BLEND * max(float(np.abs(height).max()), 1e-300)
         t = np.clip(0.5 - 0.5 * height / reach, 0.0, 1.0)
         self._jaw = t * t * (3.0 - 2.0 * t)
