@@ -8,6 +8,7 @@ teeth do, may stand out as far. A push spreads over the neighbours, so that it l
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,6 +17,7 @@ from scipy import sparse
 from scipy.spatial import cKDTree
 
 from facegen.errors import InputError
+from facegen.geometry.normals import vertex_normals
 from facegen.geometry.operators import Surface
 from facegen.transfer.eyeball import Eyeball, gaze_rotation
 from facegen.transfer.piece_motion import PieceMotion
@@ -38,7 +40,9 @@ _GIVE = 0.02
 # Teeth farther than this share of the height before any skin have not come through it; they hang free.
 _THROUGH = 0.12
 # Teeth farther than this share behind the lips never reach them.
-_NEAR_LIPS = 0.25
+_NEAR_LIPS = 0.15
+# Lips come from no farther than this share of the height to lie before them.
+_LIP_TRAVEL = 0.15
 # Lips: skin within this share of the height from the lip line that looks forward and was to be seen at rest.
 _LIP_REACH, _FORWARD = 0.6, 0.1
 _SEEN = 0.03
@@ -51,17 +55,20 @@ _TINY = 1e-300
 
 @dataclass(frozen=True, eq=False)
 class Contact:
-    """How deep something is through the skin at most, in each shape (k,), mm, beyond what it is at rest."""
+    """How deep something is through the skin at most, in each shape (k,), mm, beyond what is allowed and what it is at
+    rest."""
 
     before: Array
     after: Array
 
 
 def keep_apart(pieces: PieceMotion, motion: ArrayLike,
-               gaze: ArrayLike | None = None) -> tuple[Array, dict[str, Contact]]:
+               gaze: ArrayLike | None = None, *,
+               allowed: Mapping[str, ArrayLike] | None = None) -> tuple[Array, dict[str, Contact]]:
     """Return displacements (k, n, 3) in which nothing pokes through, and what was measured: "eye_L", "teeth_upper"...
 
     motion (k, n, 3): of all vertices, as `PieceMotion.move` gives, mm. gaze (k, 4): as given there.
+    allowed: name -> mm (k,): how deep something may be through the skin, such as the template's own ``before``.
     """
     motion = np.array(motion, float)
     if motion.ndim != 3 or motion.shape[1:] != pieces.vertices.shape:
@@ -70,18 +77,20 @@ def keep_apart(pieces: PieceMotion, motion: ArrayLike,
     if angles.shape != (len(motion), 4):
         raise InputError(f"gaze: expected shape ({len(motion)}, 4), got {angles.shape}")
     spread = _Spread(pieces.skin)
+    deep = {name: np.broadcast_to(np.asarray(mm, float), len(motion)) for name, mm in (allowed or {}).items()}
+    none = np.zeros(len(motion))
     found = {}
     for s, ball in pieces.eyes.items():
         if ball.slide is None:          # a disc has no inside
             own = angles[:, :2] if s == "L" else angles[:, 2:]
             turn = gaze_rotation(own[:, 0], own[:, 1], ball.azimuth)
-            found[f"eye_{s}"] = _Lids(pieces, s, ball).part(motion, turn, spread)
+            found[f"eye_{s}"] = _Lids(pieces, s, ball).part(motion, turn, deep.get(f"eye_{s}", none), spread)
     rows = {kind: pieces.rows(kind) for kind in ("teeth_upper", "teeth_lower", "tongue")}
     if any(len(one) for one in rows.values()):
         lips = _Lips(pieces)
         for kind, own in rows.items():
             if len(own):
-                found[kind] = lips.part(motion, own, spread)
+                found[kind] = lips.part(motion, own, deep.get(kind, none), spread)
     return motion, found
 
 
@@ -125,8 +134,9 @@ class _Lids:
         near = (np.linalg.norm(away, axis=1) < _LID_REACH) & (away @ look > _LID_BACK)
         # A lid's back may lie in the eye, where nobody sees it: its front may not.
         outside = np.einsum("ti,ti->t", pieces.skin.normals, pieces.skin.corners.mean(axis=1) - ball.centre)
-        near_faces = near[pieces.skin.faces].all(axis=1) & (outside > _FRONT * ball.radius)
-        faces = pieces.skin.faces[near_faces]
+        near_faces = near[pieces.skin.faces].all(axis=1)
+        outside = outside * (np.sign(outside[near_faces].sum()) or 1.0)         # triangles may be wound inward
+        faces = pieces.skin.faces[near_faces & (outside > _FRONT * ball.radius)]
         sides = np.unique(np.sort(faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1), axis=0)
         corners = np.unique(faces)
         # Every sample as three corners: a vertex thrice, a side's ends with one twice and half the weight each.
@@ -134,15 +144,14 @@ class _Lids:
         self._weights = np.concatenate([np.tile([1.0, 0.0, 0.0], (len(corners), 1)),
                                         np.tile([0.5, 0.25, 0.25], (len(sides), 1)),
                                         np.full((len(faces), 3), 1 / 3)])
-        rest = self._clearance(np.zeros_like(pieces.vertices), np.eye(3))
+        self._samples = np.einsum("sc,sci->si", self._weights, self._rest[self._corners])
+        rest = self._clearance(self._samples, np.eye(3))
         self._least = np.minimum(rest, 0.0) - _FACETS * ball.radius
+        self._spare = np.where(np.isfinite(rest), rest, 0.0) - self._least
 
-    def _places(self, moved: Array) -> Array:
-        return np.einsum("sc,sci->si", self._weights, (self._rest + moved)[self._corners])
-
-    def _clearance(self, moved: Array, turn: Array) -> Array:
-        """Return how far outside the eye the samples (s,) lie, mm; infinite where that is beyond doubt."""
-        away = (self._places(moved) - self._ball.centre) @ self._inverse
+    def _clearance(self, places: Array, turn: Array) -> Array:
+        """Return how far outside the eye places (s, 3) lie, mm; infinite where that is beyond doubt."""
+        away = (places - self._ball.centre) @ self._inverse
         length = np.linalg.norm(away, axis=1)
         result = np.full(len(away), np.inf)
         near = np.flatnonzero((length < self._farthest) & (length > 0))
@@ -156,27 +165,42 @@ class _Lids:
             result[near] = np.where(radius > 0, (length[near] - radius) * self._ball.radius, np.inf)
         return result
 
-    def part(self, motion: Array, turn: Array, spread: _Spread) -> Contact:
+    def part(self, motion: Array, turn: Array, allowed: Array, spread: _Spread) -> Contact:
         """Push the skin out of the eye in all shapes, in place."""
         before, after = np.zeros(len(motion)), np.zeros(len(motion))
         if not len(self._corners):
             return Contact(before, after)
-        moves = np.any(motion[:, np.unique(self._corners)] != 0, axis=(1, 2)) | np.any(turn != np.eye(3), axis=(1, 2))
-        for k in np.flatnonzero(moves):
+        turns = np.any(turn != np.eye(3), axis=(1, 2))
+        moves = np.any(motion[:, np.unique(self._corners)] != 0, axis=(1, 2))
+        for k in np.flatnonzero(moves | turns):
             for step in range(_ROUNDS + 1):
-                missing = np.maximum(self._least - self._clearance(motion[k], turn[k]), 0.0)
+                missing = self._missing(motion[k], turn[k] if turns[k] else None, allowed[k])
                 after[k] = missing.max()
                 before[k] = after[k] if step == 0 else before[k]
                 if after[k] <= _DONE * self._ball.radius or step == _ROUNDS:
                     break
-                push = np.zeros(len(self._rest))
-                np.maximum.at(push, self._corners.ravel(), np.repeat(missing, 3))
-                push = spread(push)
-                pushed = np.flatnonzero(push > 0)
-                away = (self._rest + motion[k])[pushed] - self._ball.centre
-                out = away / np.maximum(np.linalg.norm(away, axis=1), _TINY)[:, None]
-                motion[k, pushed] += push[pushed, None] * out
+                self._push(motion[k], missing, spread)
         return Contact(before, after)
+
+    def _missing(self, moved: Array, turn: Array | None, allowed: float) -> Array:
+        """Return how much farther out the samples (s,) would have to lie, mm."""
+        moved = np.einsum("sc,sci->si", self._weights, moved[self._corners])
+        missing = np.zeros(len(moved))
+        # Where the eye is still, skin that moves by less than it has to spare is safe.
+        some = np.arange(len(moved)) if turn is not None else \
+            np.flatnonzero((moved**2).sum(axis=1) > np.maximum(self._spare, 0.0) ** 2)
+        clear = self._clearance(self._samples[some] + moved[some], np.eye(3) if turn is None else turn)
+        missing[some] = np.maximum(self._least[some] - allowed - clear, 0.0)
+        return missing
+
+    def _push(self, moved: Array, missing: Array, spread: _Spread) -> None:
+        """Push the skin out along the rays from the eye's centre, in place."""
+        push = np.zeros(len(self._rest))
+        np.maximum.at(push, self._corners.ravel(), np.repeat(missing, 3))
+        push = spread(push)
+        pushed = np.flatnonzero(push > 0)
+        away = (self._rest + moved)[pushed] - self._ball.centre
+        moved[pushed] += (push[pushed] / np.maximum(np.linalg.norm(away, axis=1), _TINY))[:, None] * away
 
 
 # -- lips ----------------------------------------------------------------------------------------------------------
@@ -196,25 +220,31 @@ class _Lips:
         # What was hidden at rest, such as the back of the mouth, is no barrier.
         seen = _ahead(middles[rows], corners[rows])[0] < _SEEN * face.height
         self._faces = pieces.skin.faces[rows[seen]]
+        self._facing = vertex_normals(pieces.vertices, pieces.faces) @ self._axes[2] > 0
 
-    def part(self, motion: Array, rows: NDArray, spread: _Spread) -> Contact:
+    def part(self, motion: Array, rows: NDArray, allowed: Array, spread: _Spread) -> Contact:
         """Bring a row of teeth behind the lips in all shapes, in place."""
         before, after = np.zeros(len(motion)), np.zeros(len(motion))
         corners = self._rest[self._faces] @ self._axes.T
         gap, _ = _ahead(self._rest[rows] @ self._axes.T, corners)
-        near = (gap < _NEAR_LIPS * self._height) & (gap > -_THROUGH * self._height)
+        near = (gap < _NEAR_LIPS * self._height) & (gap > -_THROUGH * self._height) & self._facing[rows]
         if not near.any():
             return Contact(before, after)
         own, gap = rows[near], gap[near]
         least = np.minimum(gap, 0.0) - _ALLOWED * self._height
-        skin = np.unique(self._faces)
+        at = self._rest[own] @ self._axes.T
+        margin = _LIP_TRAVEL * self._height
+        close = ((corners.max(axis=1) > at.min(axis=0) - margin) & (corners.min(axis=1) < at.max(axis=0) + margin))
+        faces = self._faces[close[:, :2].all(axis=1)]
+        skin = np.unique(faces)
         moves = np.any(motion[:, skin] != 0, axis=(1, 2)) | np.any(motion[:, own] != 0, axis=(1, 2))
         for k in np.flatnonzero(moves):
             given = 0.0
             for step in range(_ROUNDS + 1):
                 places = (self._rest[own] + motion[k, own]) @ self._axes.T
-                now, which = _ahead(places, (self._rest + motion[k])[self._faces] @ self._axes.T)
-                missing = np.where((which >= 0) & (now > -_THROUGH * self._height), np.maximum(least - now, 0.0), 0.0)
+                now, which = _ahead(places, (self._rest + motion[k])[faces] @ self._axes.T)
+                through = (which >= 0) & (now > -_THROUGH * self._height)
+                missing = np.where(through, np.maximum(least - now - allowed[k], 0.0), 0.0)
                 after[k] = missing.max()
                 before[k] = after[k] if step == 0 else before[k]
                 if after[k] <= _DONE * self._height or step == _ROUNDS:
@@ -224,7 +254,7 @@ class _Lips:
                 motion[k, rows] -= back * self._axes[2]
                 push = np.zeros(len(self._rest))
                 hit = missing > back
-                np.maximum.at(push, self._faces[which[hit]].ravel(), np.repeat(missing[hit] - back, 3))
+                np.maximum.at(push, faces[which[hit]].ravel(), np.repeat(missing[hit] - back, 3))
                 motion[k] += spread(push)[:, None] * self._axes[2]
         return Contact(before, after)
 

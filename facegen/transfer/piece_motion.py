@@ -53,7 +53,7 @@ class PieceMotion:
 
     def __init__(self, pieces: Sequence[Piece], vertices: ArrayLike, faces: ArrayLike,
                  points: Mapping[str, ArrayLike]) -> None:
-        """pieces: `find_pieces` of vertices (n, 3), mm, in the template's frame, and faces (m, 3). points: landmarks."""
+        """pieces: what `find_pieces` gave for vertices (n, 3), mm, in the template's frame, faces (m, 3) and points."""
         self.pieces = tuple(pieces)
         self.vertices, self.faces = np.asarray(vertices, float), np.asarray(faces, np.int64)
         faces = self.faces
