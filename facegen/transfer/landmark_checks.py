@@ -143,8 +143,9 @@ def _touching(p: dict[str, Array], corners: NDArray, weights: Array, mesh: Mesh)
         for name in (high, low):
             own = corners[row[name]][weights[row[name]] > 1e-6]
             touching = np.isin(mesh.faces, own).sum(axis=1) >= len(own)
-            around.append(float((mesh.vertices[mesh.faces[touching]].mean(axis=(0, 1)) - p[name]) @ up))
-        if around[0] < 0 < around[1]:
+            if touching.any():
+                around.append(float((mesh.vertices[mesh.faces[touching]].mean(axis=(0, 1)) - p[name]) @ up))
+        if len(around) == 2 and around[0] < 0 < around[1]:
             errors.append(f"'{high}' and '{low}' are swapped: the first is on what lies above the slit")
     return errors
 

@@ -39,6 +39,10 @@ _BEHIND = 0.45
 _EYE_NEAR, _EYE_SIZE = 0.9, 1.6
 # A strip this much longer than wide is a lash or a brow; below this size, in eye widths, a spot may be any shape.
 _STRIP, _SPOT = 0.42, 0.5
+# Hair of a lash stands this far out of the lids' plane, in eye widths, at its tips and on the mean.
+_TIPS, _HAIR = 0.3, 0.12
+# A landmark this near to the skin, as a share of the face's height, is on it: a tenth of a millimetre on a person.
+_SAME = 1e-3
 # Thin: nine tenths of its vertices within this share of the face's height of the skin; touching: a tenth of them.
 _THIN, _TOUCHES = 0.09, 0.05
 # Both rows of teeth in one piece: the lip line leaves at least this share of its height on either side.
@@ -115,17 +119,29 @@ def skin_components(parts: Components, points: Points, given: Mapping[int, str])
     for place in core:          # the nearest triangle is among those whose ball comes as near as the nearest middle
         distance = np.sqrt(((middles - place) ** 2).sum(axis=1))
         candidates |= distance - reach <= distance.min()
-    rows = np.flatnonzero(candidates)
-    feet = ClosestPoints(Surface(parts.vertices, parts.faces[rows]))(core)
-    numbers, counts = np.unique(parts.of_face[rows[feet.faces]], return_counts=True)
-    carried = dict(zip(numbers.tolist(), counts.tolist(), strict=True))
+    owners = parts.of_face[candidates]
+    carried = _nearest_component(parts, core, np.flatnonzero(candidates))
     most = max(carried, key=carried.get)
+    # What lies as near to a landmark as that skin, such as an eye in its lids, does not carry it.
+    rows = np.flatnonzero(candidates)[owners == most]
+    beside = ClosestPoints(Surface(parts.vertices, parts.faces[rows]))(core).distances > _SAME * Face(points).height
+    carried = {most: int((~beside).sum())}
+    if beside.any():
+        for c, count in _nearest_component(parts, core[beside], np.flatnonzero(candidates)).items():
+            carried[c] = carried.get(c, 0) + count
     skin = {c for c in carried if c == most or _kind_by_name(parts, c) in ("", "skin", "body")}
     skin = {c for c in skin if given.get(c, "skin") == "skin"} | {c for c, kind in given.items() if kind == "skin"}
     if not skin:
         raise InputError(f"pieces: '{parts.name(most)}' carries the landmarks, so it is the skin; nothing is left to "
                          "be skin if it is something else")
     return frozenset(skin), carried
+
+
+def _nearest_component(parts: Components, places: Array, rows: NDArray) -> dict[int, int]:
+    """Return component -> how many places lie nearest to it, of the triangles in ``rows``."""
+    feet = ClosestPoints(Surface(parts.vertices, parts.faces[rows]))(places)
+    numbers, counts = np.unique(parts.of_face[rows[feet.faces]], return_counts=True)
+    return dict(zip(numbers.tolist(), counts.tolist(), strict=True))
 
 
 def kinds_by_place(parts: Components, points: Points, skin: frozenset[int],
@@ -240,7 +256,10 @@ def _in_eye(look: _Look, face: Face, s: str) -> float:
 
 
 def _round(look: _Look, face: Face, s: str) -> bool:
-    """Whether a component is a ball, a shell, a disc or a small spot, rather than a strip along a lid."""
+    """Whether a component is a ball, a shell, a disc or a small spot, rather than hair on a lid."""
+    ahead = (look.vertices - face.eye(s)) @ face.eye_outward(s) / face.eye_width(s)
+    if ahead.max() > _TIPS and ahead.mean() > _HAIR:
+        return False
     spread = np.linalg.svd(look.vertices - look.vertices.mean(axis=0), compute_uv=False)
     return bool(spread[1] > _STRIP * spread[0] or look.reach < 0.5 * _SPOT * face.eye_width(s))
 
