@@ -17,6 +17,7 @@ Array = NDArray[np.float64]
 
 # A cornea is about a fifth of a ball: this share of the surface decides the sphere.
 _KEPT = 0.7
+_FEWEST = 8         # vertices that say something about a sphere
 _ROUNDS = 12
 # Misfit of a sphere, as a share of its radius, above which an ellipsoid is tried; and how much better that must be.
 _EGG, _BETTER = 0.03, 0.4
@@ -88,10 +89,11 @@ def fit_eye(components: Sequence[tuple[Array, Array]], *, outward: Array, width:
     """
     at, area = max(components, key=lambda one: float(np.ptp(one[0], axis=0).max()))
     area = np.maximum(area, 1e-12 * max(area.max(), 1e-300))
-    thin = np.linalg.svd((at - at.mean(axis=0)) / max(np.sqrt(len(at)), 1), full_matrices=False)
-    centre, radius, misfit = _sphere(at, area)
-    if len(at) < 8 or thin[1][2] < _FLAT * thin[1][0] or not radius < _LARGEST * width:
-        normal = thin[2][2] * np.sign(thin[2][2] @ outward or 1.0)
+    enough = len(at) >= _FEWEST
+    _, spread, axes = np.linalg.svd(at - at.mean(axis=0) if enough else np.zeros((3, 3)), full_matrices=False)
+    centre, radius, misfit = _sphere(at, area) if enough else (outward, np.inf, np.inf)
+    if spread[2] <= _FLAT * spread[0] or not radius < _LARGEST * width:
+        normal = axes[2] * np.sign(axes[2] @ outward or 1.0) if spread[1] > 0 else outward
         middle = pupil if pupil is not None else np.average(at, axis=0, weights=area)
         ball = _BEHIND * width
         # A disc as wide as the opening is sclera and all: it would leave a gap where it slid away from.
@@ -131,7 +133,7 @@ def _sphere(at: Array, area: Array) -> tuple[Array, float, float]:
         order = np.argsort(off, kind="stable")
         share = np.cumsum(area[order]) / area.sum()
         weight = np.where(off <= off[order[min(np.searchsorted(share, _KEPT), len(at) - 1)]], area, 0.0)
-        if (weight > 0).sum() < 8:
+        if (weight > 0).sum() < _FEWEST:
             break
     return centre + middle, radius, float(np.sqrt(np.average(off**2, weights=area)))
 

@@ -35,6 +35,8 @@ _FRONT = 0.3
 _AROUND = 10
 # A direction this little beside a triangle meets it: rounding must leave no seam.
 _SEAM = 1e-9
+# Because a triangle seen from the centre at no more than this solid angle has no inside.
+_SLIVER = 1e-9
 # A row of teeth gives way by this share of the face's height: two millimetres on a person.
 _GIVE = 0.02
 # Teeth farther than this share of the height before any skin have not come through it; they hang free.
@@ -124,7 +126,7 @@ class _Lids:
         corners = ((pieces.vertices - ball.centre) @ self._inverse)[faces]
         self._farthest = np.linalg.norm(corners, axis=2).max()
         # A direction d meets the triangle a, b, c where d = l1 a + l2 b + l3 c with no l below zero, at 1 / sum l.
-        solid = np.abs(np.linalg.det(corners)) > _TINY
+        solid = np.abs(np.linalg.det(corners)) > _SLIVER * np.linalg.norm(corners, axis=2).prod(axis=1)
         self._meets = np.linalg.inv(np.swapaxes(corners[solid], 1, 2))
         middles = corners[solid].mean(axis=1)
         self._middles = cKDTree(middles / np.maximum(np.linalg.norm(middles, axis=1), _TINY)[:, None])
@@ -215,7 +217,8 @@ class _Lips:
         corners = pieces.skin.corners @ self._axes.T
         middles = corners.mean(axis=1)
         near = np.linalg.norm(middles - self._axes @ face.lips, axis=1) < _LIP_REACH * face.height
-        near &= pieces.skin.normals @ self._axes[2] > _FORWARD
+        forward = pieces.skin.normals @ self._axes[2]
+        near &= forward * (np.sign(forward[near].sum()) or 1.0) > _FORWARD      # triangles may be wound inward
         rows = np.flatnonzero(near)
         # What was hidden at rest, such as the back of the mouth, is no barrier.
         seen = _ahead(middles[rows], corners[rows])[0] < _SEEN * face.height

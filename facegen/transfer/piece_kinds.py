@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from facegen.errors import InputError
+from facegen.face.landmarks import REQUIRED
 from facegen.geometry.closest import ClosestPoints
 from facegen.geometry.operators import Surface
 from facegen.transfer.components import Components
@@ -45,6 +46,8 @@ _TIPS, _HAIR = 0.3, 0.12
 _SAME = 1e-3
 # Thin: nine tenths of its vertices within this share of the face's height of the skin; touching: a tenth of them.
 _THIN, _TOUCHES = 0.09, 0.05
+# Within this, it is painted on, an outline or a mask: it follows the face however wide it is.
+_TIGHT = 0.03
 # Both rows of teeth in one piece: the lip line leaves at least this share of its height on either side.
 _ROWS = 0.3
 # Wider than the brows by this, it goes round the head.
@@ -56,6 +59,14 @@ class Face:
     """Lengths and directions of a face, from its landmarks in the template's frame."""
 
     points: Points
+
+    def __post_init__(self) -> None:
+        missing = [name for name in REQUIRED if name not in self.points]
+        if missing:
+            raise InputError(f"points: the landmarks {', '.join(missing)} are missing")
+        wrong = [name for name, at in self.points.items() if np.shape(at) != (3,) or not np.isfinite(at).all()]
+        if wrong:
+            raise InputError(f"points: expected three finite numbers for {', '.join(wrong)}")
 
     @property
     def height(self) -> float:
@@ -78,6 +89,11 @@ class Face:
     def mouth_width(self) -> float:
         """From corner to corner."""
         return float(np.linalg.norm(self.points["mouth_corner_L"] - self.points["mouth_corner_R"]))
+
+    @property
+    def brows(self) -> float:
+        """From the tail of one brow to the other's."""
+        return float(np.linalg.norm(self.points["brow_outer_L"] - self.points["brow_outer_R"]))
 
     @property
     def lip_normal(self) -> Array:
@@ -109,9 +125,8 @@ class Face:
 
 def skin_components(parts: Components, points: Points, given: Mapping[int, str]) -> tuple[frozenset[int], dict]:
     """Return which components are skin, and how many landmarks each carries; InputError if none is left."""
+    height = Face(points).height
     core = np.array([place for name, place in points.items() if name.removesuffix("_L").removesuffix("_R") in _CORE])
-    if not len(core):
-        raise InputError("points: expected the landmarks of eyes, nose, mouth and chin")
     corners = parts.vertices[parts.faces]
     middles = corners.mean(axis=1)
     reach = np.sqrt(((corners - middles[:, None]) ** 2).sum(axis=2).max(axis=1))
@@ -124,7 +139,7 @@ def skin_components(parts: Components, points: Points, given: Mapping[int, str])
     most = max(carried, key=carried.get)
     # What lies as near to a landmark as that skin, such as an eye in its lids, does not carry it.
     rows = np.flatnonzero(candidates)[owners == most]
-    beside = ClosestPoints(Surface(parts.vertices, parts.faces[rows]))(core).distances > _SAME * Face(points).height
+    beside = ClosestPoints(Surface(parts.vertices, parts.faces[rows]))(core).distances > _SAME * height
     carried = {most: int((~beside).sum())}
     if beside.any():
         for c, count in _nearest_component(parts, core[beside], np.flatnonzero(candidates)).items():
@@ -260,6 +275,8 @@ def _round(look: _Look, face: Face, s: str) -> bool:
     ahead = (look.vertices - face.eye(s)) @ face.eye_outward(s) / face.eye_width(s)
     if ahead.max() > _TIPS and ahead.mean() > _HAIR:
         return False
+    if len(look.vertices) < 3:
+        return True
     spread = np.linalg.svd(look.vertices - look.vertices.mean(axis=0), compute_uv=False)
     return bool(spread[1] > _STRIP * spread[0] or look.reach < 0.5 * _SPOT * face.eye_width(s))
 
@@ -271,6 +288,8 @@ def _mouth_distance(look: _Look, face: Face) -> float:
     up = float(away @ face.lip_normal)
     forward = np.cross([1.0, 0.0, 0.0], face.lip_normal)
     depth = -float(away @ forward)
+    if look.high[0] - look.low[0] > max(face.brows, 1.3 * face.mouth_width):
+        return np.inf                               # an outline round the head has its middle there too
     # Behind the lips as far as the jaw is long, up and down as far as nose and chin leave room.
     room = 0.35 * face.height
     return max(abs(away[0]) / (0.75 * width), abs(up) / room, depth / (1.5 * max(width, 0.4 * face.height)),
@@ -281,15 +300,16 @@ def _outside(look: _Look, face: Face) -> tuple[str, str]:
     """Return what a component outside is: on the face and carried by it, beside it, or far below."""
     p, height = face.points, face.height
     size = look.high - look.low
-    brows = max(p["brow_outer_L"][0] - p["brow_outer_R"][0], 1e-300)
     top = (p["brow_mid_L"][1] + p["brow_mid_R"][1]) / 2
     below = p["neck"][1] if "neck" in p else p["chin"][1] - 0.5 * height
     if look.middle[1] < below or size.max() > 6 * height:
         return "body", "below the head" if look.middle[1] < below else "larger than a head"
     if look.round_blocked > 0.9 and look.blocked > 0.9:
         return "skull", "inside the head"
-    on_face = abs(look.middle[0]) < 0.6 * brows and look.middle[1] < top + 0.12 * height
-    narrow = size[0] < _ROUND_HEAD * brows
+    on_face = abs(look.middle[0]) < 0.6 * face.brows and look.middle[1] < top + 0.12 * height
+    narrow = size[0] < _ROUND_HEAD * face.brows
+    if on_face and look.thick < _TIGHT * height:
+        return "carried", "tight on the skin"
     if on_face and narrow and look.touch < _TOUCHES * height:
         if look.thick < _THIN * height:
             return "carried", "thin, on the skin"

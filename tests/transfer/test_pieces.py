@@ -12,6 +12,9 @@ from hypothesis import strategies as st
 from piece_avatars import ball, disc, dressed, head, lashes, moustache, template, together, tube, with_body
 
 from facegen.errors import InputError
+from facegen.geometry.normals import vertex_normals
+from facegen.transfer.keep_apart import keep_apart
+from facegen.transfer.piece_motion import PieceMotion
 from facegen.transfer.piece_names import KINDS, kind_of_name, row_of_name, words_of
 from facegen.transfer.pieces import describe, find_pieces
 from facegen.transfer.weld import weld
@@ -189,8 +192,54 @@ def test_wrong_arrays():
         find_pieces(avatar.vertices[:4], avatar.faces, avatar.points)
     with pytest.raises(InputError, match="names: expected one for each of"):
         find_pieces(avatar.vertices, avatar.faces, avatar.points, names=["a"])
-    with pytest.raises(InputError, match="points: expected the landmarks"):
-        find_pieces(avatar.vertices, avatar.faces, {"head_top": [0, 0, 0]})
+    some = {name: place for name, place in avatar.points.items() if name not in ("chin", "nose_tip")}
+    with pytest.raises(InputError, match="points: the landmarks nose_tip, chin are missing"):
+        find_pieces(avatar.vertices, avatar.faces, some)
+    with pytest.raises(InputError, match="points: expected three finite numbers for chin"):
+        find_pieces(avatar.vertices, avatar.faces, {**avatar.points, "chin": [0, np.nan, 0]})
+
+
+def test_degenerate_and_tiny_pieces():
+    """Triangles without area, doubled triangles, an edge used by three, a vertex that nothing uses."""
+    avatar = head()
+    first = avatar.faces[avatar.faces[:, 0] != avatar.faces[0, 1]][:1]
+    more = np.concatenate([avatar.faces, avatar.faces[:3], first[:, [0, 0, 0]], first[:, [0, 1, 1]]])
+    n = len(avatar.vertices)
+    eye = (avatar.points["eye_upper_L"] + avatar.points["eye_lower_L"]) / 2
+    more = np.concatenate([more, [[n, n, n], [n + 1, n + 2, n + 2], [0, 1, n + 3]]])
+    vertices = np.concatenate([avatar.vertices, [eye, eye + np.array([1, 0, 0]), eye, [0, 60, 30], [0, 0, 0]]])
+    names = avatar.names + ["x"] * (len(more) - len(avatar.names))
+    broken = replace(avatar, vertices=vertices, faces=more, names=names)
+    for named in (True, False):
+        pieces = broken.pieces(named)
+        assert sum(len(piece.faces) for piece in pieces) == len(more)
+        moves = PieceMotion(pieces, broken.vertices, broken.faces, broken.points)
+        motion = np.random.default_rng(0).normal(size=(2, len(vertices), 3))
+        out, found = keep_apart(moves, moves.move(motion, gaze=np.full((2, 4), 9.0)), np.full((2, 4), 9.0))
+        assert np.isfinite(out).all()
+        assert "eye_L" in found
+
+
+def test_an_outline_round_the_face_follows_it():
+    avatar = head()
+    own = avatar.faces[[name.startswith("skin|") for name in avatar.names]]
+    used, local = np.unique(own, return_inverse=True)
+    at = avatar.vertices[used] + 0.8 * vertex_normals(avatar.vertices, own)[used]
+    outlined = avatar.plus("contour", at, local.reshape(-1, 3)[:, ::-1])
+    assert outlined.kinds(named=False)["contour"] == {"carried"}
+
+
+def test_thousands_of_cards_of_hair():
+    avatar = head()
+    rng = np.random.default_rng(0)
+    card = tube([[0, 0, 0], [0, 4, 3], [0, 9, 5]], 0.5, around=3)
+    places = avatar.points["head_top"] + rng.normal(scale=[40, 12, 40], size=(2000, 3))
+    many = avatar.plus("strands", *together([(card[0] + at, card[1]) for at in places]))
+    start = time.perf_counter()
+    found = many.kinds(named=False)
+    assert time.perf_counter() - start < 15.0                # a second on a free machine
+    assert "skull" in found["strands"]
+    assert found["teeth_lower"] == {"teeth_lower"}
 
 
 # -- the report ----------------------------------------------------------------------------------------------------
