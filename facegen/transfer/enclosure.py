@@ -45,15 +45,15 @@ def blocked_share(points: Array, samples: Array, cell: float) -> tuple[Array, Ar
     """
     blocked = np.zeros((len(_DIRECTIONS), len(points)), bool)
     for k, out in enumerate(_DIRECTIONS):
-        across = np.linalg.svd(out[None])[2][1:].T                          # (3, 2), at right angles
-        low = samples @ across
-        corner = low.min(axis=0) if len(low) else np.zeros(2)
-        size = np.maximum(((low.max(axis=0) - corner) / cell).astype(int) + 1, 1) if len(low) else np.ones(2, int)
+        across = np.linalg.svd(out[None])[2][1:]                            # (2, 3), at right angles
+        x, y = across @ samples.T
+        corner = np.array([x.min(), y.min()]) if len(samples) else np.zeros(2)
+        i, j = ((x - corner[0]) / cell).astype(int), ((y - corner[1]) / cell).astype(int)
+        size = np.array([i.max(initial=0), j.max(initial=0)]) + 1
         farthest = np.full(size[0] * size[1], -np.inf)
-        cells = ((low - corner) / cell).astype(int)
-        np.maximum.at(farthest, cells[:, 0] * size[1] + cells[:, 1], samples @ out)
-        own = np.floor((points @ across - corner) / cell).astype(int)
-        inside = ((own >= 0) & (own < size)).all(axis=1)
+        np.maximum.at(farthest, i * size[1] + j, samples @ out)
+        own = np.floor((points @ across.T - corner) / cell).astype(int)
+        inside = (own[:, 0] >= 0) & (own[:, 0] < size[0]) & (own[:, 1] >= 0) & (own[:, 1] < size[1])
         depth = (points @ out)[inside] + _AHEAD * cell
         blocked[k, inside] = farthest[own[inside, 0] * size[1] + own[inside, 1]] > depth
     return blocked[:len(_FRONT)].mean(axis=0), blocked.mean(axis=0)

@@ -272,7 +272,8 @@ def _ahead(places: Array, corners: Array) -> tuple[Array, NDArray[np.int64]]:
     det = ab[:, 0] * ac[:, 1] - ab[:, 1] * ac[:, 0]
     upright = np.abs(det) > _TINY
     det = np.where(upright, det, np.inf)
-    low, high = corners[:, :, :2].min(axis=1), corners[:, :, :2].max(axis=1)
+    b, c = corners[:, 1], corners[:, 2]
+    low, high = np.minimum(np.minimum(a, b), c), np.maximum(np.maximum(a, b), c)    # quicker than min(axis=1)
     # Triangles in the order of their left ends: those over a place begin at most the widest one's width before it.
     order = np.argsort(low[:, 0], kind="stable")
     starts = low[order, 0]

@@ -14,15 +14,14 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from facegen.errors import InputError
-from facegen.face.landmarks import REQUIRED
 from facegen.geometry.closest import ClosestPoints
 from facegen.geometry.operators import Surface
 from facegen.transfer.components import Components
 from facegen.transfer.enclosure import blocked_share, sample_surface, spacing_for
+from facegen.transfer.face_measures import FaceMeasures, Points
 from facegen.transfer.piece_names import kind_of_name, row_of_name
 
 Array = NDArray[np.float64]
-Points = Mapping[str, Array]
 
 # Landmarks that only skin carries. Brows may be strips of their own, eye_center is on the ball, head_top on a cap.
 _CORE = ("eye_inner", "eye_outer", "eye_upper", "eye_lower", "nose_tip", "nose_bridge", "nose_wing", "mouth_corner",
@@ -54,78 +53,9 @@ _ROWS = 0.3
 _ROUND_HEAD = 1.25
 
 
-@dataclass(frozen=True, eq=False)
-class Face:
-    """Lengths and directions of a face, from its landmarks in the template's frame."""
-
-    points: Points
-
-    def __post_init__(self) -> None:
-        missing = [name for name in REQUIRED if name not in self.points]
-        if missing:
-            raise InputError(f"points: the landmarks {', '.join(missing)} are missing")
-        wrong = [name for name, at in self.points.items() if np.shape(at) != (3,) or not np.isfinite(at).all()]
-        if wrong:
-            raise InputError(f"points: expected three finite numbers for {', '.join(wrong)}")
-
-    @property
-    def height(self) -> float:
-        """From the chin to the brows, at least what a face that is all eyes has."""
-        p = self.points
-        brows = (p["brow_mid_L"] + p["brow_mid_R"]) / 2
-        return max(float(np.linalg.norm(brows - p["chin"])), float(np.linalg.norm(self.eye("L") - self.eye("R"))))
-
-    @property
-    def centre(self) -> Array:
-        """The middle of eyes and mouth (3,)."""
-        return (self.eye("L") + self.eye("R") + 2 * self.lips) / 4
-
-    @property
-    def lips(self) -> Array:
-        """The middle of the lip line (3,)."""
-        return (self.points["mouth_inner_top"] + self.points["mouth_inner_bottom"]) / 2
-
-    @property
-    def mouth_width(self) -> float:
-        """From corner to corner."""
-        return float(np.linalg.norm(self.points["mouth_corner_L"] - self.points["mouth_corner_R"]))
-
-    @property
-    def brows(self) -> float:
-        """From the tail of one brow to the other's."""
-        return float(np.linalg.norm(self.points["brow_outer_L"] - self.points["brow_outer_R"]))
-
-    @property
-    def lip_normal(self) -> Array:
-        """The direction (3,) from the lower row of teeth to the upper: at right angles to the lip line and to the way
-        from the lips to the corners, which runs far back along a muzzle and hardly at all on a person."""
-        p = self.points
-        back = (p["mouth_corner_L"] + p["mouth_corner_R"]) / 2 - self.lips + [0.0, 0.0, -0.5 * self.mouth_width]
-        up = np.cross(-back, [1.0, 0.0, 0.0])
-        return up / max(np.linalg.norm(up), 1e-300)
-
-    def eye(self, s: str) -> Array:
-        """The middle (3,) of an eye's opening."""
-        return np.mean([self.points[f"eye_{name}_{s}"] for name in ("inner", "outer", "upper", "lower")], axis=0)
-
-    def eye_width(self, s: str) -> float:
-        """From corner to corner, or between the lids if that is more."""
-        p = self.points
-        return max(float(np.linalg.norm(p[f"eye_inner_{s}"] - p[f"eye_outer_{s}"])),
-                   float(np.linalg.norm(p[f"eye_upper_{s}"] - p[f"eye_lower_{s}"])))
-
-    def eye_outward(self, s: str) -> Array:
-        """The direction (3,) in which the lids' opening looks."""
-        p = self.points
-        across = p[f"eye_outer_{s}"] - p[f"eye_inner_{s}"]
-        up = p[f"brow_mid_{s}"] - p[f"eye_lower_{s}"]
-        out = np.cross(across, up) * (1.0 if s == "L" else -1.0)
-        return out / max(np.linalg.norm(out), 1e-300)
-
-
 def skin_components(parts: Components, points: Points, given: Mapping[int, str]) -> tuple[frozenset[int], dict]:
     """Return which components are skin, and how many landmarks each carries; InputError if none is left."""
-    height = Face(points).height
+    height = FaceMeasures(points).height
     core = np.array([place for name, place in points.items() if name.removesuffix("_L").removesuffix("_R") in _CORE])
     corners = parts.vertices[parts.faces]
     middles = corners.mean(axis=1)
@@ -162,7 +92,7 @@ def _nearest_component(parts: Components, places: Array, rows: NDArray) -> dict[
 def kinds_by_place(parts: Components, points: Points, skin: frozenset[int],
                    given: Mapping[int, str]) -> dict[int, tuple[str, str]]:
     """Return component -> (kind, reason) for all that are not skin."""
-    face = Face(points)
+    face = FaceMeasures(points)
     others = [c for c in range(parts.count) if c not in skin]
     found = {c: (given[c], "given") for c in others if c in given}
     rest = [c for c in others if c not in given]
@@ -201,7 +131,7 @@ class _Look:
         return float(np.sqrt(((self.vertices - self.middle) ** 2).sum(axis=1).max()))
 
 
-def _look(parts: Components, which: list[int], skin: frozenset[int], face: Face) -> dict[int, _Look]:
+def _look(parts: Components, which: list[int], skin: frozenset[int], face: FaceMeasures) -> dict[int, _Look]:
     """Look at components, all at once."""
     cell = _CELL * face.height
     own = np.isin(parts.of_face, list(skin))
@@ -232,7 +162,7 @@ def _kind_by_name(parts: Components, c: int) -> str:
     return kind_of_name(parts.name(c).replace("|", " "))
 
 
-def _place(parts: Components, c: int, look: _Look, face: Face) -> tuple[str, str]:
+def _place(parts: Components, c: int, look: _Look, face: FaceMeasures) -> tuple[str, str]:
     """Return the kind of a component and why; "inside" for what lies behind the lips."""
     said = _kind_by_name(parts, c)
     named = f"named '{parts.name(c)}'"
@@ -258,7 +188,7 @@ def _word(side: str) -> str:
     return {"L": "left", "R": "right"}[side]
 
 
-def _in_eye(look: _Look, face: Face, s: str) -> float:
+def _in_eye(look: _Look, face: FaceMeasures, s: str) -> float:
     """Return how far a component is from being in an eye: below one it is where a ball, a cornea or a spot would be."""
     width = face.eye_width(s)
     if width <= 0:
@@ -270,7 +200,7 @@ def _in_eye(look: _Look, face: Face, s: str) -> float:
     return max(aside / 0.6, look.reach / (_EYE_SIZE * width), depth / 0.3 if depth > 0 else -depth / _EYE_NEAR)
 
 
-def _round(look: _Look, face: Face, s: str) -> bool:
+def _round(look: _Look, face: FaceMeasures, s: str) -> bool:
     """Whether a component is a ball, a shell, a disc or a small spot, rather than hair on a lid."""
     ahead = (look.vertices - face.eye(s)) @ face.eye_outward(s) / face.eye_width(s)
     if ahead.max() > _TIPS and ahead.mean() > _HAIR:
@@ -281,7 +211,7 @@ def _round(look: _Look, face: Face, s: str) -> bool:
     return bool(spread[1] > _STRIP * spread[0] or look.reach < 0.5 * _SPOT * face.eye_width(s))
 
 
-def _mouth_distance(look: _Look, face: Face) -> float:
+def _mouth_distance(look: _Look, face: FaceMeasures) -> float:
     """Return how far a component's middle is from being in the mouth: below one it is where teeth would be."""
     width = max(face.mouth_width, 0.25 * face.height)
     away = look.middle - face.lips
@@ -296,7 +226,7 @@ def _mouth_distance(look: _Look, face: Face) -> float:
                -depth / (0.15 * face.height))
 
 
-def _outside(look: _Look, face: Face) -> tuple[str, str]:
+def _outside(look: _Look, face: FaceMeasures) -> tuple[str, str]:
     """Return what a component outside is: on the face and carried by it, beside it, or far below."""
     p, height = face.points, face.height
     size = look.high - look.low
@@ -318,7 +248,7 @@ def _outside(look: _Look, face: Face) -> tuple[str, str]:
     return "skull", "stands out from the face" if on_face else "beside the face"
 
 
-def _mouth_kinds(parts: Components, which: list[int], face: Face) -> dict[int, tuple[str, str]]:
+def _mouth_kinds(parts: Components, which: list[int], face: FaceMeasures) -> dict[int, tuple[str, str]]:
     """Return component -> (kind, reason) of what lies behind the lips: upper or lower row, tongue or lining."""
     if not which:
         return {}
@@ -349,11 +279,11 @@ def _mouth_kinds(parts: Components, which: list[int], face: Face) -> dict[int, t
     return result
 
 
-def _large(box: tuple[Array, Array], face: Face) -> bool:
+def _large(box: tuple[Array, Array], face: FaceMeasures) -> bool:
     return bool((box[1] - box[0])[0] > 0.5 * face.mouth_width)
 
 
-def _is_tongue(at: Array, heights: Array, face: Face) -> bool:
+def _is_tongue(at: Array, heights: Array, face: FaceMeasures) -> bool:
     """Whether a component is one long full body in the middle: a row of teeth is empty there, a tooth is short."""
     x, depth = at[:, 0], -at @ np.cross([1.0, 0.0, 0.0], face.lip_normal)
     half, long = np.ptp(x) / 2, np.ptp(depth)

@@ -16,7 +16,7 @@ from facegen.errors import InputError
 from facegen.geometry.operators import Surface
 from facegen.transfer.carried import Carried, SkinFrames
 from facegen.transfer.eyeball import Eyeball, fit_eye
-from facegen.transfer.piece_kinds import Face
+from facegen.transfer.face_measures import FaceMeasures
 from facegen.transfer.piece_names import kind_of_name
 from facegen.transfer.pieces import Piece
 
@@ -57,7 +57,7 @@ class PieceMotion:
         self.pieces = tuple(pieces)
         self.vertices, self.faces = np.asarray(vertices, float), np.asarray(faces, np.int64)
         faces = self.faces
-        self.face = face = Face({name: np.asarray(place, float) for name, place in points.items()})
+        self.face = face = FaceMeasures({name: np.asarray(place, float) for name, place in points.items()})
         self.skin = skin = Surface(self.vertices, np.concatenate(
             [faces[piece.faces] for piece in pieces if piece.kind == "skin"] or [np.empty((0, 3), np.int64)]))
         if not len(skin.faces):
@@ -111,7 +111,7 @@ class PieceMotion:
         """Return the vertices of all pieces of some kinds."""
         return np.concatenate([p.vertices for p in self.pieces if p.kind in kinds] or [np.empty(0, np.int64)])
 
-    def _eye(self, s: str, faces: NDArray, face: Face) -> Eyeball:
+    def _eye(self, s: str, faces: NDArray, face: FaceMeasures) -> Eyeball:
         parts = []
         for piece in self.pieces:
             if piece.kind == f"eye_{s}":
@@ -124,7 +124,7 @@ class PieceMotion:
 class _Lining:
     """A mouth's lining, or both rows of teeth in one piece: below the lip line with the jaw, above it still."""
 
-    def __init__(self, piece: Piece, vertices: Array, skin: Surface, face: Face) -> None:
+    def __init__(self, piece: Piece, vertices: Array, skin: Surface, face: FaceMeasures) -> None:
         self.rows = piece.vertices
         self._at = vertices[self.rows]
         height = (self._at - face.lips) @ face.lip_normal

@@ -265,7 +265,7 @@ def test_numbers_of_another_mesh(mesh):
     with pytest.raises(InputError, match="do not form a face"):
         check_places(marks, mesh)
     with pytest.raises(InputError, match=r"use vertex 99999, the mesh has .* another mesh"):
-        check_places(Landmarks(("chin",), np.zeros(1, int), np.full((1, 3), 99999), np.ones((1, 3)) / 3), mesh)
+        check_places(replace(marks, corners=corners + 99999 - corners.max()), mesh)
 
 
 def test_lids_and_lips_set_on_what_lies_behind(mesh, points):
@@ -303,11 +303,21 @@ def test_meshes_that_are_none(points):
     broken = Mesh.of(np.full((3, 3), np.nan), [[0, 1, 2]])
     with pytest.raises(InputError, match="mesh: expected at least one triangle and finite vertices"):
         snap(points, broken)
-    marks = Landmarks(("chin",), np.zeros(1, int), np.zeros((1, 3), int), np.full((1, 3), 1 / 3))
+    k = len(REQUIRED)
+    marks = Landmarks(REQUIRED, np.zeros(k, int), np.zeros((k, 3), int), np.full((k, 3), 1 / 3))
     with pytest.raises(InputError, match="mesh: expected finite vertices"):
         check_places(marks, broken)
     with pytest.raises(InputError, match="expected three corners"):
-        check_places(Landmarks(("chin",), np.zeros(1, int), np.zeros((1, 2), int), np.ones((1, 2))), broken)
+        check_places(replace(marks, corners=np.zeros((k, 2), int)), broken)
+    with pytest.raises(InputError, match=r"landmarks: 'brow_inner_L', .* and 16 more missing"):
+        check_places(Landmarks(("chin",), np.zeros(1, int), np.zeros((1, 3), int), np.ones((1, 3))), broken)
+
+
+@pytest.mark.parametrize(("points", "words"), [({}, "at least one landmark"), ({"chin": [0, 0]}, "for 'chin'|for chin"),
+                                               ({"chin": [0, np.nan, 1]}, "three finite numbers")])
+def test_points_that_are_none(mesh, points, words):
+    with pytest.raises(InputError, match=words):
+        snap(points, mesh)
 
 
 def test_a_head_on_a_body(mesh, points):

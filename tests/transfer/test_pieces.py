@@ -10,10 +10,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from piece_avatars import ball, disc, dressed, head, lashes, moustache, template, together, tube, with_body
+from scipy.spatial.transform import Rotation
 
 from facegen.errors import InputError
+from facegen.geometry.mesh import Mesh
 from facegen.geometry.normals import vertex_normals
+from facegen.transfer.alignment import Similarity, align
 from facegen.transfer.keep_apart import keep_apart
+from facegen.transfer.landmarks import check_places, snap
 from facegen.transfer.piece_motion import PieceMotion
 from facegen.transfer.piece_names import KINDS, kind_of_name, row_of_name, words_of
 from facegen.transfer.pieces import describe, find_pieces
@@ -154,6 +158,22 @@ def test_a_thick_moustache_and_a_pipe_are_carried():
     pipe = tube([lip + np.array([t * 0.3, -t * 0.2, t]) for t in np.linspace(-1, 45, 9)], 3.0)
     found = avatar.plus("b", *pipe).kinds(named=False)
     assert (found["a"], found["b"]) == ({"carried"}, {"carried"})
+
+
+@pytest.mark.parametrize(("turn", "scale"), [((0, 90, 0), 1e-3), ((-90, 0, 0), 200 / 250), ((180, 30, 77), 40.0)])
+def test_from_a_file_s_own_axes_and_units(turn, scale):
+    """A head on a body, in any axes and units: landmarks pass, and in the working frame all is as before."""
+    avatar = with_body()
+    move = Similarity(scale, Rotation.from_euler("xyz", turn, degrees=True).as_matrix(), np.array([3.0, 500.0, -8.0]))
+    mesh = Mesh.of(move.apply(avatar.vertices), avatar.faces)
+    marks = snap({name: move.apply(at) for name, at in avatar.points.items()}, mesh)
+    assert check_places(marks, mesh) == []
+    found = align(marks.points(mesh.vertices), avatar.points)
+    vertices = found.apply(mesh.vertices)
+    np.testing.assert_allclose(vertices, avatar.vertices, atol=0.5)
+    moved = replace(avatar, vertices=vertices, points={
+        name: found.apply(at) for name, at in marks.points(mesh.vertices).items()})
+    assert moved.kinds(named=False) == avatar.kinds(named=False)
 
 
 # -- what the user says --------------------------------------------------------------------------------------------
