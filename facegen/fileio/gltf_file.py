@@ -17,7 +17,7 @@ from urllib.parse import unquote, urlsplit
 
 from facegen.errors import FileError, InputError
 from facegen.fileio.binfile import MOST_BYTES, read_bytes
-from facegen.fileio.jsontree import Tree, parse
+from facegen.fileio.jsontree import Items, Tree, parse
 
 _MAGIC, _JSON, _BIN = 0x46546C67, 0x4E4F534A, 0x004E4942      # "glTF", "JSON", "BIN\0"
 _LARGEST_GLB = (1 << 32) - 1                                  # lengths in a GLB have 32 bits
@@ -26,6 +26,8 @@ _LARGEST_GLB = (1 << 32) - 1                                  # lengths in a GLB
 _HARMLESS = ("KHR_materials_", "KHR_texture_", "EXT_texture_", "MSFT_texture_", "KHR_lights_", "KHR_xmp", "VRM")
 _KNOWN = {"KHR_mesh_quantization", "KHR_node_visibility", "KHR_animation_pointer", "EXT_lights_image_based", "VRM",
           "KHR_node_hoverability", "KHR_node_selectability"}
+_LISTS = ("accessors", "animations", "buffers", "bufferViews", "images", "materials", "meshes", "nodes", "samplers",
+          "scenes", "skins", "textures")
 _COMPRESSED = {"KHR_draco_mesh_compression": "Draco", "EXT_meshopt_compression": "meshopt",
                "KHR_meshopt_compression": "meshopt"}
 
@@ -58,6 +60,7 @@ def read_gltf(path: Path) -> GltfFile:
     tree = Tree(found, path)
     if not tree["asset"]["version"].text().startswith("2."):
         raise tree["asset"]["version"].error(f"facegen reads glTF 2, got {tree['asset']['version'].text()[:20]!r}")
+    _check_lists(tree)
     refuse_extensions(tree)
     digest = hashlib.sha256(raw)
     buffers = []
@@ -94,6 +97,18 @@ def _chunks(raw: bytes, path: Path) -> tuple[bytes, bytes | None, bytes]:
     if not chunks:
         raise FileError(f"{path}: its first chunk must be JSON")
     return chunks[0], chunks[1] if len(chunks) > 1 else None, raw[at:length]
+
+
+def _check_lists(tree: Tree) -> None:
+    """Raise FileError unless every list at the top of the file is one, of what it must hold."""
+    for key in _LISTS:
+        if key in tree.value:
+            for one in Items(Tree(tree.value[key], tree.path, key)):
+                one.members()
+    for key in ("extensionsUsed", "extensionsRequired"):
+        if key in tree.value:
+            for one in Items(Tree(tree.value[key], tree.path, key)):
+                one.text()
 
 
 def refuse_extensions(tree: Tree) -> None:

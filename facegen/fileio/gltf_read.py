@@ -32,10 +32,11 @@ class Block:
     """One POSITION accessor as one node shows it: rows start..stop of the mesh.
 
     ``linear``: (3, 3), or (n, 3, 3) for a skin: turns motion in the file's space of the mesh into motion in the world.
-    ``primitives``: those of the mesh that use the accessor.
+    ``primitives``: those of the mesh that use the accessor. ``part``: the node's name in the mesh.
     """
 
     node: int
+    part: str
     mesh: int
     accessor: int
     primitives: tuple[int, ...]
@@ -59,7 +60,11 @@ class GltfScene:
 
 def read_scene(path: Path) -> GltfScene:
     """Read a .glb, .vrm or .gltf file. Raises FileError, which names the place in the file's JSON."""
-    file = read_gltf(path)
+    return scene_of(read_gltf(path))
+
+
+def scene_of(file: GltfFile) -> GltfScene:
+    """Return what a glTF file shows. Raises FileError, which names the place in the file's JSON."""
     return _Reader(file).result()
 
 
@@ -170,11 +175,11 @@ class _Reader:
             if primitive["attributes"].get("POSITION"):
                 reference = primitive["attributes"]["POSITION"]
                 users.setdefault(self.accessors.index(reference), []).append(i)
-        blocks = [self._block(number, accessor, [primitives[i] for i in which], tuple(which), joints)
+        blocks = [self._block(number, part, accessor, [primitives[i] for i in which], tuple(which), joints)
                   for accessor, which in users.items()]
         self._add_primitives(mesh, part, primitives, blocks)
 
-    def _block(self, number: int, accessor: int, primitives: list[Tree], which: tuple[int, ...],
+    def _block(self, number: int, part: str, accessor: int, primitives: list[Tree], which: tuple[int, ...],
                joints: NDArray | None) -> Block:
         attributes = primitives[0]["attributes"]
         count = self.accessors.count(attributes["POSITION"])
@@ -191,7 +196,7 @@ class _Reader:
         if not np.isfinite(world).all():
             raise self.scene.nodes[number].error("takes vertices to infinity")
         mesh = self.scene.nodes[number]["mesh"].integer()
-        block = Block(number, mesh, accessor, which, self.count, self.count + count, linear)
+        block = Block(number, part, mesh, accessor, which, self.count, self.count + count, linear)
         self.blocks.append(block)
         self.vertices.append(world)
         self.count += count

@@ -68,7 +68,8 @@ class Tree:
         """Return the members of this object by name."""
         if not isinstance(self.value, dict):
             raise self.error(f"expected an object, got {_shown(self.value)}")
-        return {key: self[key] for key, value in self.value.items() if value is not None}
+        return {key: Tree(value, self.path, f"{self.place}.{key}") for key, value in self.value.items()
+                if value is not None}
 
     def integer(self, low: int = 0, high: int = _LARGEST) -> int:
         """Return a whole number low..high."""

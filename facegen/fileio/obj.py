@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from facegen.errors import FileError
 from facegen.fileio.binfile import read_bytes
 from facegen.fileio.fans import fans
+from facegen.fileio.textlines import lines_of
 from facegen.geometry.mesh import Mesh
 
 # What follows a corner's first index: "/4/7" or "//7".
@@ -53,14 +54,6 @@ def read_obj(path: str | Path) -> ObjFile:
     raw = read_bytes(path, what="mesh", kind="an OBJ file")
     return _Reader(path, raw).result()
 
-
-def lines_of(raw: bytes) -> list[str]:
-    """Return the lines of a text file, whatever its line ends, UTF-8 or Latin-1."""
-    try:
-        text = raw.decode("utf-8-sig")
-    except UnicodeDecodeError:
-        text = raw.decode("latin-1")
-    return text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
 
 
 class _Reader:
