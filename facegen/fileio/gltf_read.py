@@ -212,10 +212,11 @@ class _Reader:
             self.triangle_count += len(faces)
             if self.triangle_count > _MOST_TRIANGLES:
                 raise primitive.error(f"more than {_MOST_TRIANGLES:,} triangles in all, which facegen does not read")
+            if primitive.items("targets"):
+                rows = np.unique(faces) if len(faces) else np.arange(count)
+                self.targets.append((block, primitive, target_names(mesh, primitive, part), rows))
             if not len(faces):
                 continue
-            if primitive.items("targets"):
-                self.targets.append((block, primitive, target_names(mesh, primitive, part), np.unique(faces)))
             if np.median(np.linalg.det(block.linear)) < 0:
                 faces = faces[:, ::-1]              # a mirrored node turns its triangles over (3.7.4)
             self.face_parts.append(self.parts.setdefault(part, len(self.parts)))
