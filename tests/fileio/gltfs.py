@@ -265,7 +265,7 @@ def seams():
     skin_ = b.primitive(split, again, material=0)
     places = np.stack([np.where(split[:, 0] > 0, 0.75, 0.25), np.full(len(split), 0.5)], -1)
     skin_["attributes"]["TEXCOORD_0"] = b.accessor(places, target=34962)
-    picture = np.zeros((64, 64, 3)) + [200, 150, 120]
+    picture = np.full((64, 64, 3), [200, 150, 120])
     picture[:, 32:] = [20, 60, 180]
     b.json.update(images=[{"bufferView": b.view(png(picture)), "mimeType": "image/png"}], textures=[{"source": 0}],
                   materials=[{"name": "two", "pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}}])

@@ -66,6 +66,7 @@ def seen_by_threejs(judges: Path, avatar: Path, poses: list[str], profile: Path)
             server.shutdown()
             server.server_close()
     if not found:
-        raise AssertionError(f"three.js said nothing within {SECONDS} s: {profile.with_suffix('.log').read_text()[-2000:]}")
+        said = profile.with_suffix(".log").read_text(errors="replace")[-2000:]
+        raise AssertionError(f"three.js said nothing within {SECONDS} s: {said}")
     assert "error" not in found, found["error"]
     return found

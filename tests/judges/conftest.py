@@ -80,9 +80,6 @@ def figure() -> AvatarFile:
 
 def written(kind: str, folder: Path, **options) -> tuple[Path, AvatarFile, dict[str, np.ndarray]]:
     """Return a rigged avatar of a kind, the avatar before, and its shapes."""
-    if kind == "obj":
-        avatar = figure()
-    else:
-        avatar = load_avatar(gltfs.write(folder / f"{kind}.glb", *gltfs.KINDS[kind]()))
+    avatar = figure() if kind == "obj" else load_avatar(gltfs.write(folder / f"{kind}.glb", *gltfs.KINDS[kind]()))
     shapes = bumps(avatar.mesh.vertices)
     return save_avatar(avatar, folder / f"{kind}-rigged.glb", shapes, notes={"version": 1}, **options), avatar, shapes
