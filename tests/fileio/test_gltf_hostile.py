@@ -70,7 +70,9 @@ def test_containers(tmp_path, raw, words):
     ('{"asset": {"version": "2.0"}}', "shows no triangles"),
     ('{"asset": {"version": "2.0"}, "nodes": null}', "nodes: expected a list, got nothing"),
     ('{"asset": {"version": "2.0"}, "nodes": [7]}', r"nodes\[0\]: expected an object, got 7"),
-    ('{"asset": NaN}', "NaN is no JSON number"), ('{"asset": 1e999}', "1e999 is no JSON number"), ('{"asset": ' + "9" * 5000 + "}", "cannot be read"),
+    ('{"asset": NaN}', "NaN is no JSON number"),
+    ('{"asset": 1e999}', "1e999 is no JSON number"),
+    ('{"asset": ' + "9" * 5000 + "}", "cannot be read"),
     ("[" * 100_000 + "]" * 100_000, "nested too deeply"),
     ('{"asset": {"version": "2.0"}, "nodes": {}}', "expected a list, got an object of 0"),
     ('{"asset": {"version": 2}}', r"asset\.version: expected a text, got 2"),
@@ -128,6 +130,14 @@ def test_json_bombs(tmp_path, monkeypatch):
 ])
 def test_places_that_are_wrong(tmp_path, change, words):
     refuse(tmp_path, changed("plain", change), words)
+
+
+def test_a_name_that_utf_8_cannot_hold(tmp_path):
+    found, data = gltfs.plain()
+    found["nodes"][0]["name"] = "\ud800"
+    avatar = load_avatar(gltfs.write(tmp_path / "a.glb", found, data))
+    path = save_avatar(avatar, tmp_path / "b.glb", {"a": np.ones_like(avatar.mesh.vertices)})
+    assert load_avatar(path).mesh.parts == ("\ud800",)
 
 
 def test_compressed_views_are_refused_by_name(tmp_path):

@@ -139,7 +139,6 @@ def test_our_own_shapes_are_replaced(load, tmp_path):
     first = load_avatar(save_avatar(avatar, tmp_path / "b.glb", shapes))
     only = np.where(np.arange(len(shapes["all"]))[:, None] < 24, 2 * shapes["all"], 0.0)    # of the cube alone
     again = load_avatar(save_avatar(first, tmp_path / "c.glb", {"all": only, "new": shapes["few"]}))
-    assert list(again.shapes) == ["few", "all", "none", "new"] or set(again.shapes) == {"few", "all", "none", "new"}
     assert_same_shapes(again.shapes, {**shapes, "all": only, "new": shapes["few"]}, 6.0)
 
 
@@ -201,14 +200,11 @@ def test_what_cannot_be_quantised_is_refused(load, tmp_path):
     avatar = load("plain")
     with pytest.raises(InputError, match=r"quantise: 'far' moves node 0 by 1\.5 .*reaches 1 only"):
         save_avatar(avatar, tmp_path / "b.glb", {"far": np.full_like(VERTICES, 1.5)}, quantise=True)
-    found, data = gltfs.plain()
     b = Build()
     b.node(mesh=b.mesh(b.primitive(1e-3 * VERTICES, FACES)))
     with pytest.raises(InputError, match=r"too coarse for an avatar of 0\.002 units"):
         save_avatar(load(*b.result()), tmp_path / "b.glb", {"a": np.full_like(VERTICES, 1e-4)}, quantise=True)
     assert not (tmp_path / "b.glb").exists()
-    assert found
-    assert data
 
 
 def test_motion_in_a_direction_that_the_file_flattens(load, tmp_path):

@@ -11,15 +11,17 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from conftest import written
+from rigged import written
 
 PYTHON = os.environ.get("FACEGEN_BPY") or (sys.executable if importlib.util.find_spec("bpy") else None)
 
 
 @pytest.mark.skipif(PYTHON is None, reason="bpy is not installed; FACEGEN_BPY may name a Python that has it")
-@pytest.mark.parametrize("kind", ["obj", "instanced", "morphing", "quantised", "transformed", "seams", "skin"])
-def test_shape_keys(tmp_path, kind):
-    path, avatar, shapes = written(kind, tmp_path)
+@pytest.mark.parametrize(("kind", "quantise"), [
+    ("obj", False), ("obj", True), ("instanced", False), ("morphing", False), ("quantised", False),
+    ("transformed", False), ("seams", False), ("skin", False)])
+def test_shape_keys(tmp_path, kind, quantise):
+    path, avatar, shapes = written(kind, tmp_path, quantise=quantise)
     done = subprocess.run([PYTHON, str(Path(__file__).with_name("blender_look.py")), str(path)], capture_output=True,
                           text=True, timeout=300, check=False)
     assert done.returncode == 0, done.stdout + done.stderr
@@ -39,4 +41,4 @@ def test_shape_keys(tmp_path, kind):
         rows = away.argmin(axis=1)
         for name, delta in one["keys"].items():
             if kind != "seams":     # there, places are shared by vertices that move on their own
-                np.testing.assert_allclose(delta, expected[name][rows] @ turn.T, atol=1e-5 * size)
+                np.testing.assert_allclose(delta, expected[name][rows] @ turn.T, atol=2e-5 * size)

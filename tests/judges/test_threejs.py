@@ -10,8 +10,8 @@ import gltfs
 import numpy as np
 import pytest
 from browser import chromium, seen_by_threejs
-from conftest import missing, written
 from PIL import Image
+from rigged import missing, written
 
 
 @pytest.fixture

@@ -5,7 +5,7 @@ from __future__ import annotations
 import gltfs
 import numpy as np
 import pytest
-from conftest import bumps, figure, written
+from rigged import bumps, figure, written
 
 from facegen.fileio.avatar import load_avatar, save_avatar
 
