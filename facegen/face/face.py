@@ -6,7 +6,7 @@ no code. A face is a rig: ``pose(what)`` gives vertices, ``mesh(detail)`` what t
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache, cached_property
 from pathlib import Path
@@ -144,9 +144,8 @@ class Face:
         cannot be understood.
         """
         found = self.resolve(what, person=person, intensity=intensity)
-        whole = weighted_sum([(1.0, self._in_millimetres(one)) for one in (found.deformation, *found.more)]) \
-            if found.more else found.deformation
-        return self.pose_controls(self.controls(whole, strict=not found.units), detail=detail)
+        controls = self.joined_controls((found.deformation, *found.more), strict=not found.units)
+        return self.pose_controls(controls, detail=detail)
 
     def resolve(self, what: Any, *, person: Any = None, intensity: float = 1.0) -> Resolution:
         """Return the chain name -> units -> deformation data (Akimoto 1986, fig. 10).
@@ -193,6 +192,12 @@ class Face:
         # Folds saturate: two units that crease the same skin do not crease it twice as deep.
         folds = np.minimum(np.array([deformation.folds.get(k, 0.0) for k in d.folds]), DEEPEST_FOLD)
         return Controls(vectors, jaw_state, lids, eyes, head, folds)
+
+    def joined_controls(self, several: Sequence[Deformation], *, strict: bool = False) -> Controls:
+        """Return the deformer's input for the sum of deformations, whatever their units of length."""
+        whole = several[0] if len(several) == 1 else \
+            weighted_sum([(1.0, self._in_millimetres(one)) for one in several])
+        return self.controls(whole, strict=strict)
 
     def pose_controls(self, controls: Controls, *, detail: int = 2) -> Array:
         """Return vertices (..., n, 3), mm, of ``mesh(detail)`` for (a batch of) controls."""
