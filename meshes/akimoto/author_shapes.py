@@ -13,9 +13,10 @@ from facegen.facs.tables import load_units
 
 LEAST = 0.12        # mm: smaller movements are left out of the table
 MEET = 0.40         # where the lips meet, from the upper lip's place in the open mouth (0) to the lower lip's (1)
-# How much of its lip's way a point goes, by the beginning of its name.
+# How much of the closed lips' way a point goes instead of its own, by the beginning of its name; the first counts.
+FOLLOWS = {"lip_upper_surround": 0.5, "lip_upper": 1.0, "philtrum": 0.4, "nose_base": 0.1,
+           "lip_lower_surround": 0.45, "lip_lower": 1.0, "chin_fold": 0.3}
 UPPER = {"lip_upper_border": 0.86, "lip_upper_surround": 0.5, "lip_upper": 1.0, "philtrum": 0.4, "nose_base": 0.1}
-LOWER = {"lip_lower_border": 0.86, "lip_lower_surround": 0.5, "lip_lower": 1.0, "chin_fold": 0.4}
 SHIFT, WIDE, HIGH = 8.0, 54.0, 36.0     # mm: of the mouth to the side, and over which that fades
 TILT = 0.12                             # the leading corner rises by this share
 CURVE = -0.0165                         # 1 / mm: the row of teeth curves back by this times the square of x
@@ -44,16 +45,16 @@ def close(face) -> Vectors:
     at, way = dict(zip(names, deformer.points, strict=True)), dict(zip(names, moved, strict=True))
     columns = ["", "_inner_L", "_side_L", "_outer_L"]
     across = [at[f"lip_upper{c}"][0] for c in columns] + [at["mouth_corner_L"][0]]
-    gaps = np.array([way[f"lip_lower{c}"] - way[f"lip_upper{c}"] for c in columns] + [np.zeros(3)])
+    # Where the closed lips go, column by column: between the two lips' ways, and with the corner.
+    seam = np.array([(1 - MEET) * way[f"lip_upper{c}"] + MEET * way[f"lip_lower{c}"] for c in columns]
+                    + [way["mouth_corner_L"]])
     found = {}
     for name in names:
-        for parts, part in ((UPPER, MEET), (LOWER, MEET - 1.0)):
-            share = next((share for stem, share in parts.items() if name.startswith(stem)), 0.0)
-            if share:
-                x = abs(at[name][0])
-                gap = np.array([np.interp(x, across, gaps[:, axis]) for axis in range(3)])
-                gap[0] *= np.sign(at[name][0])
-                found[name] = share * part * gap
+        share = next((share for stem, share in FOLLOWS.items() if name.startswith(stem)), 0.0)
+        x = at[name][0]
+        goal = np.array([np.interp(abs(x), across, seam[:, axis]) for axis in range(3)]) * [np.sign(x), 1, 1]
+        if share:
+            found[name] = share * (goal - way[name])
     return found
 
 
