@@ -182,7 +182,12 @@ class Shapes:
 
     @cached_property
     def _vectors(self) -> NDArray[np.float64]:
-        return _space().vectors(self.recipes)
+        space = _space()
+        vectors = space.vectors(self.recipes)
+        for name, one in self.recipes.items():
+            if one.members:             # summed as their units are, so that an expression's units find its shape exactly
+                vectors[self._rows[name]] = space.of(one.members)
+        return vectors
 
     @cached_property
     def _fit(self) -> Fit:
