@@ -116,7 +116,7 @@ class Face:
             points = face.landmark_points(face.pose("happiness"))
             points["mouth_corner_L"] - points["mouth_corner_R"]
         """
-        return _placed(self.landmarks, self._landmark_weights(detail), vertices, detail)
+        return _placed(self.landmarks, self.landmark_weights(detail), vertices, detail)
 
     def cage_sides(self, detail: int = 2) -> NDArray[np.bool_]:
         """Return which sides (m, 3) of the triangles of ``mesh(detail)`` run along the cage's edges.
@@ -329,7 +329,7 @@ class Face:
         folds = np.array([fold_field(f, neutral, normals) for f in d.folds.values()]).reshape(len(d.folds), n, 3)
         return _Level(matrix, mesh, tuple(lids), folds, d.head_weight(mesh.vertices))
 
-    def _landmark_weights(self, detail: int) -> sparse.csr_array:
+    def landmark_weights(self, detail: int = 2) -> sparse.csr_array:
         """Return the weights (k, n) of the vertices of ``mesh(detail)`` that place the landmarks; kept."""
         mesh = self.mesh(detail)
         if detail not in self._landmarks_on:

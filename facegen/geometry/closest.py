@@ -15,6 +15,8 @@ from facegen.geometry.operators import Surface
 # So many triangles with the nearest middles are tried. Because a large triangle beside small ones may hold the nearest
 # point though its middle is far, large ones are in the search with several middles.
 _TRIED = 12
+# So many are measured for every point; of the others only those that can still be nearer.
+_FIRST = 3
 # Because a triangle with a side of more than this many typical sides would be missed by its middle alone.
 _LARGE = 2.0
 _TINY = 1e-300
@@ -49,6 +51,7 @@ class ClosestPoints:
         large = np.flatnonzero(reach > _LARGE * np.median(reach))
         more = (corners[large] + centroids[large, None]) / 2                    # towards each corner
         self._owner = np.concatenate([np.arange(len(corners)), np.repeat(large, 3)])
+        self._reach = reach
         self._tree = cKDTree(np.concatenate([centroids, more.reshape(-1, 3)]))
 
     def __call__(self, points: NDArray, normals: NDArray | None = None, *, least_cosine: float = 0.0,
@@ -61,20 +64,27 @@ class ClosestPoints:
         signs say on which side of a slit a place lies.
         """
         points = np.asarray(points, float)
-        k = min(_TRIED, len(self._owner))
-        _, near = self._tree.query(points, k=k, workers=-1)
-        near = self._owner[near.reshape(len(points), k)]
+        k, rows = min(_TRIED, len(self._owner)), np.arange(len(points))
+        apart, near = self._tree.query(points, k=k, workers=-1)
+        near, apart = self._owner[near.reshape(len(points), k)], apart.reshape(len(points), k)
         allowed = np.ones(near.shape, bool)
         if normals is not None:
             allowed &= np.einsum("pi,pki->pk", normals, self.surface.normals[near]) > least_cosine
         if labels is not None:
             allowed &= (labels[0][:, None, :] * labels[1][near] > -0.25).all(axis=2)
-        weights = _barycentric_of_foot(self.surface.corners[near], points[:, None, :])
-        feet = np.einsum("pkc,pkci->pki", weights, self.surface.corners[near])
-        distance = np.sqrt(((feet - points[:, None]) ** 2).sum(axis=2))
-        distance[~allowed] = np.inf
+        weights, feet = np.zeros((len(points), k, 3)), np.zeros((len(points), k, 3))
+        distance = np.full((len(points), k), np.inf)
+
+        def measure(p: NDArray, j: NDArray) -> None:
+            corners = self.surface.corners[near[p, j]]
+            weights[p, j] = _barycentric_of_foot(corners, points[p])
+            feet[p, j] = np.einsum("pc,pci->pi", weights[p, j], corners)
+            distance[p, j] = np.sqrt(((feet[p, j] - points[p]) ** 2).sum(axis=1))
+
+        measure(*np.nonzero(allowed & (np.arange(k) < _FIRST)))
+        hopeful = apart - self._reach[near] < distance[:, :_FIRST].min(axis=1)[:, None]
+        measure(*np.nonzero(allowed & (np.arange(k) >= _FIRST) & hopeful))
         best = distance.argmin(axis=1)
-        rows = np.arange(len(points))
         found = np.isfinite(distance[rows, best])
         return Feet(np.where(found, near[rows, best], -1), weights[rows, best], feet[rows, best], distance[rows, best])
 

@@ -108,7 +108,7 @@ def jaw_share(surface: Surface, feet: Feet, template_faces: NDArray, template_sh
     held = sparse.csc_array((n, n))
     right = trust * carried
     hold = _LIP_HOLD * area.mean()
-    for name, value in (("mouth_inner_top", 0.0), ("mouth_top", 0.0), ("mouth_inner_bottom", 1.0)):
+    for name, value in (("mouth_top", 0.0), ("mouth_bottom", 1.0)):
         if name in places:
             vertices, weights = places[name]
             row = sparse.csr_array((weights, (np.zeros(3, int), vertices)), shape=(1, n))

@@ -20,7 +20,7 @@ _ROUNDS = 3
 # Millimetres: sides shorter than this are as fine as the template.
 _SHORT = 5.0
 # A side is halved where its middle would move this many millimetres otherwise than the mean of its ends.
-_BEND = 0.35
+BEND = 0.35
 
 
 def refine(surface: Surface, registered: NDArray, bend: Callable[[NDArray, NDArray], NDArray]
@@ -37,7 +37,7 @@ def refine(surface: Surface, registered: NDArray, bend: Callable[[NDArray, NDArr
         edges, of_side = fine.edges
         a, b = registered[edges[:, 0]], registered[edges[:, 1]]
         split = np.flatnonzero(((a - b) ** 2).sum(axis=1) > _SHORT**2)
-        split = split[bend(a[split], b[split]) > _BEND] if len(split) else split
+        split = split[bend(a[split], b[split]) > BEND] if len(split) else split
         if not len(split):
             break
         middle = np.full(len(edges), -1)

@@ -39,14 +39,16 @@ class Step:
     repeat: int = 1
 
 
-STEPS = (Step(40.0, 0.02, 0.0, 0.0), Step(40.0, 0.01, 0.002, 40.0, 3), Step(20.0, 0.003, 0.01, 25.0, 3),
-         Step(10.0, 0.001, 0.05, 15.0, 2), Step(5.0, 0.0, 0.2, 10.0, 3))
+STEPS = (Step(40.0, 0.02, 0.0, 0.0), Step(40.0, 0.01, 0.002, 40.0, 2), Step(20.0, 0.003, 0.01, 25.0, 2),
+         Step(10.0, 0.001, 0.05, 15.0, 2), Step(5.0, 0.0, 0.2, 10.0, 2))
 """From stiff to close, in the working frame: a human-sized head in millimetres."""
 
 # How firmly a landmark is held, times the largest diagonal entry: it lands within a hundredth of a millimetre.
 _HOLD = 1e2
 # Because normals of the registered skin are those of a rough draft at first: this is wider than the final match.
 _LEAST_COSINE = 0.1
+# Because a place beyond the template's border has its nearest place on the border: this far in mm, and it has no partner.
+_PAST = 1.0
 
 
 class Correspondence:
@@ -70,7 +72,7 @@ class Correspondence:
         feet = self._search(points, normals, least_cosine=least_cosine, labels=(sides, self._sides))
         beyond = ~(feet.distances <= reach)
         on_side = feet.weights[:, [2, 0, 1]] < 1e-9         # no weight of the corner opposite side k
-        beyond |= feet.found & (on_side & self._border_side[feet.faces]).any(axis=1) & (feet.distances > 1e-6)
+        beyond |= feet.found & (on_side & self._border_side[feet.faces]).any(axis=1) & (feet.distances > _PAST)
         return Feet(np.where(beyond, -1, feet.faces), feet.weights, feet.points, feet.distances)
 
 

@@ -17,13 +17,20 @@ from facegen.geometry.factor import Factor
 from facegen.geometry.operators import Surface, dirichlet
 
 SLITS = (
-    (("mouth_inner_top", "mouth_top", "mouth_upper_L", "mouth_upper_R"),
-     ("mouth_inner_bottom", "mouth_bottom", "mouth_lower_L", "mouth_lower_R"), ("mouth_corner_L", "mouth_corner_R")),
+    (("mouth_top", "mouth_upper_L", "mouth_upper_R"), ("mouth_bottom", "mouth_lower_L", "mouth_lower_R"),
+     ("mouth_corner_L", "mouth_corner_R")),
     *((tuple(f"{name}_{side}" for name in ("eye_upper", "eye_upper_inner", "eye_upper_outer")),
        tuple(f"{name}_{side}" for name in ("eye_lower", "eye_lower_inner", "eye_lower_outer")),
        (f"eye_inner_{side}", f"eye_outer_{side}")) for side in "LR"),
 )
-"""For each slit the landmarks above, below and at its corners."""
+"""For each slit the landmarks above, below and at its corners. The inner edges of the lips are not among them: where lips
+touch, a person who sets points cannot see on which lip a point lands (see `settled`)."""
+
+_INNER = {"mouth_inner_top": 1.0, "mouth_inner_bottom": -1.0}
+# Because a point on the wrong lip belongs to a vertex about as near on the other: not farther than this, in mm.
+_ASTRAY = 8.0
+# Because the field is near zero in the depth of a mouth too: a lip's edge has a side of more than this.
+_ON_A_LIP = 0.15
 
 # Millimetres along the skin over which a side fades: about the height of a lip, so that a cheek has no side.
 _REACH = 12.0
@@ -49,3 +56,22 @@ def side_fields(surface: Surface, places: Mapping[str, tuple[NDArray, NDArray]])
                     sides[vertices, slit] += _HOLD * weights * value
     # A hold of one slit also holds the others' fields at zero there: they are far from each other.
     return Factor(matrix + held, what="which side of a slit the skin lies on").solve(sides)
+
+
+def settled(surface: Surface, places: Mapping[str, tuple[NDArray, NDArray]], sides: NDArray
+            ) -> dict[str, tuple[NDArray, NDArray]]:
+    """Return the places with the inner edges of the lips on their own lip: each that lies on the other goes to the
+    nearest vertex of its own. sides: `side_fields` of the same places."""
+    result = dict(places)
+    for name, sign in _INNER.items():
+        if name not in places:
+            continue
+        vertices, weights = places[name]
+        if sign * (weights @ sides[vertices, 0]) > 0:
+            continue
+        at = weights @ surface.vertices[vertices]
+        distance = np.where(sign * sides[:, 0] > _ON_A_LIP, np.linalg.norm(surface.vertices - at, axis=1), np.inf)
+        near = int(distance.argmin())
+        if distance[near] <= _ASTRAY:
+            result[name] = (np.full(3, near), np.array([1.0, 0.0, 0.0]))
+    return result

@@ -12,6 +12,7 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import sparse
 
 from facegen.geometry.closest import Feet
 from facegen.geometry.normals import vertex_normals
@@ -19,9 +20,9 @@ from facegen.geometry.operators import Surface
 from facegen.transfer.baselines import PAPER, SUMNER, PaperWeights, expression_cloning, gradient_transfer
 from facegen.transfer.jaw import JawMotion, avatar_jaw, jaw_share
 from facegen.transfer.part_motion import MEMBERS, PartMotion, part_motion, spread
-from facegen.transfer.refine import refine
+from facegen.transfer.refine import BEND, refine
 from facegen.transfer.registration import Correspondence, register
-from facegen.transfer.sides import side_fields
+from facegen.transfer.sides import settled, side_fields
 from facegen.transfer.solve import OURS, Transfer, Weights, landmark_matrix
 from facegen.transfer.template import Template, placing
 
@@ -136,12 +137,19 @@ class Skin:
         """Return how far the motion of the middles of sides a-b is from the mean of their ends', at most, mm."""
         template = self.template.surface
         ends_and_middle = self.correspondence.nearest(np.concatenate([a, b, (a + b) / 2]))
-        faces, weights = template.faces[ends_and_middle.faces], ends_and_middle.weights
-        most = np.zeros(len(a))
+        n = len(template.vertices)
+        weights = sparse.csr_array((ends_and_middle.weights.ravel(), template.faces[ends_and_middle.faces].ravel(),
+                                    np.arange(0, 9 * len(a) + 1, 3)), shape=(3 * len(a), n))
+        one, other, middle = weights[:len(a)], weights[len(a):2 * len(a)], weights[2 * len(a):]
+        difference = sparse.csr_array(middle - (one + other) * 0.5)
+        reach = np.sqrt((motion**2).sum(axis=2)).max(axis=0)            # no side bends more than this allows
+        most = abs(difference) @ reach
+        mobile = np.flatnonzero(most > BEND)
+        most[mobile] = 0.0
         for some in _blocks(len(motion)):
-            at = np.einsum("pc,kpci->kpi", weights, motion[some][:, faces])
-            one, other, middle = np.split(at, 3, axis=1)
-            most = np.maximum(most, np.sqrt(((middle - (one + other) / 2) ** 2).sum(axis=2)).max(axis=0))
+            moved = difference[mobile] @ np.moveaxis(motion[some], 0, 1).reshape(n, -1)
+            length = np.sqrt((moved.reshape(len(mobile), -1, 3) ** 2).sum(axis=2))
+            most[mobile] = np.maximum(most[mobile], length.max(axis=1))
         return most
 
 
@@ -154,6 +162,7 @@ def lay_skin(template: Template, surface: Surface, places: Mapping[str, tuple[ND
     """
     correspondence = Correspondence(template.surface, side_fields(template.surface, template.places))
     sides = side_fields(surface, places)
+    places = settled(surface, places, sides)
     if registered is None:
         names = [name for name in places if name in template.places]
         targets = np.array([template.landmarks[name] for name in names])

@@ -34,6 +34,9 @@ from facegen.geometry.operators import Surface, dirichlet, hinge_energy
 _ALONE = 0.05
 # Because each piece that no partner holds would float: everything is tied to its place this much, times the diagonal.
 _TIE = 1e-7
+# A vertex without a partner, in a mouth's lining or on a body, stays where it is with this share of the anchor's weight:
+# the lips' motion is gone two centimetres into the mouth and does not push its walls through the cheeks.
+_STAY = 0.3
 # Millimetres over which the trust in a partner fades.
 _FADE = 6.0
 
@@ -61,8 +64,8 @@ class Transfer:
         """surface, template: the skins. feet: of the avatar's vertices (n,), triangle_feet: of its triangles' middles
         (m,). matrices (n, 3, 3): M; turns (n, 3, 3): R. landmarks (l, n); landmark_motion (3 l, 3 n_s): M r."""
         n, n_s = len(surface.vertices), len(template.vertices)
-        trust = np.where(feet.found, 1 / (1 + (np.where(feet.found, feet.distances, 0) / _FADE) ** 2), 0.0)
-        anchor = weights.anchor * surface.vertex_areas * trust
+        trust = 1 / (1 + (np.where(feet.found, feet.distances, 0) / _FADE) ** 2)
+        anchor = weights.anchor * surface.vertex_areas * np.where(feet.found, trust, _STAY)
         share = np.where(triangle_feet.found, 1.0, _ALONE)
         matrix = weights.gradients * dirichlet(surface, share) + sparse.diags_array(anchor)
         if weights.identity:

@@ -76,9 +76,7 @@ def template_of(face: Face, shapes: Mapping[str, Deformation], *, detail: int = 
     skin = mesh.part_vertices(mesh.parts[0])
     n = int(skin[-1]) + 1                                   # the skin comes first, all of its vertices are used
     surface = Surface(mesh.vertices[:n], mesh.faces[mesh.face_parts == 0])
-    points = {name: at for name, at in face.landmark_points(mesh.vertices, detail=detail).items()
-              if not name.startswith("eye_center")}
-    places = places_on(surface, points)
+    places = _skin_places(face, surface, detail)
     each = [face.controls(deformation) for deformation in shapes.values()]
     together = Controls(*(np.stack([getattr(c, field) for c in each])
                           for field in ("vectors", "jaw", "lids", "eyes", "head", "folds")))
@@ -88,6 +86,25 @@ def template_of(face: Face, shapes: Mapping[str, Deformation], *, detail: int = 
     test = face.pose({"units": "millimetre", "jaw": {"open": _TEST_OPENING}}, detail=detail)[:n] - surface.vertices
     turned = hinge.movement(surface.vertices, opened)
     share = np.clip((test * turned).sum(axis=1) / np.maximum((turned**2).sum(axis=1), 1e-12), 0.0, 1.0)
-    return Template(face.name, surface, {name: places[name][1] @ surface.vertices[places[name][0]] for name in points},
+    return Template(face.name, surface, {name: weights @ surface.vertices[rows] for name, (rows, weights) in places.items()},
                     places, tuple(shapes), motion[:, :n], together.jaw, together.eyes, hinge, share,
                     mesh, motion)
+
+
+def _skin_places(face: Face, surface: Surface, detail: int) -> dict[str, tuple[NDArray, NDArray]]:
+    """Return the landmarks on the skin: as they are defined, which tells lips that touch apart; those of other parts,
+    the brows', at the nearest place. The pupils are none of the skin's."""
+    mesh = face.mesh(detail)
+    result = {}
+    weights = face.landmark_weights(detail)
+    for row, name in enumerate(face.landmarks):
+        if name.startswith("eye_center"):
+            continue
+        start, stop = weights.indptr[row], weights.indptr[row + 1]
+        columns, shares = weights.indices[start:stop], weights.data[start:stop]
+        if len(columns) <= 3 and columns.max() < len(surface.vertices):
+            fill = 3 - len(columns)
+            result[name] = (np.pad(columns, (0, fill), mode="edge"), np.pad(shares, (0, fill)))
+        else:
+            result |= places_on(surface, {name: shares @ mesh.vertices[columns]})
+    return result

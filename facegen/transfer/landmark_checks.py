@@ -1,0 +1,353 @@
+"""What can be wrong with landmarks on a mesh, found from the places alone and said in words.
+
+Every rule has to let a horse and a cat pass, so the rules are about order, sides and mirrors more than about
+distances; the average face only tells what is no face at all.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cache
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from facegen.errors import InputError
+from facegen.geometry.mesh import Mesh
+from facegen.geometry.normals import vertex_normals
+from facegen.transfer.alignment import align
+from facegen.transfer.piece_names import INSIDE, kind_of_name
+from facegen.transfer.weld import weld
+
+Array = NDArray[np.float64]
+
+# Of the landmarks' spread, what no similarity explains: people 0.02, a horse 0.3, places at random 0.8 and more.
+_NO_FACE, _HARDLY_A_FACE = 0.75, 0.55
+# How far a place may be from its partner's mirror image, and a middle one from the middle, in distances between the
+# eyes. An asymmetric person reaches 0.15.
+_ODD_MIRROR, _WRONG_MIRROR = 0.35, 0.6
+_ODD_MIDDLE, _WRONG_MIDDLE = 0.2, 0.5
+# How far from the average face's place, in its millimetres, and how many times the usual misfit of this face.
+_FAR, _FAR_TIMES = 45.0, 5.0
+# Two places nearer than this share of the extent are one.
+_SAME = 1e-7
+# Lips and lids nearer to each other than this share of the extent are closed: height does not tell them apart.
+_TOUCHES = 0.01
+# Below this the two diagonals of an eye say nothing about which way it is turned.
+_CLEAR = 0.2
+_COINCIDE = {
+    frozenset({"mouth_inner_top", "mouth_inner_bottom"}): "mouth",
+    frozenset({"mouth_top", "mouth_inner_top"}): "lip", frozenset({"mouth_bottom", "mouth_inner_bottom"}): "lip",
+    **{frozenset({f"eye_upper{part}_{s}", f"eye_lower{part}_{s}"}): "eye"
+       for s in "LR" for part in ("", "_inner", "_outer")},
+}
+_CANNOT = {
+    "mouth": "this avatar's lips are one surface without an opening: its mouth moves but cannot open, and shapes that "
+             "part the lips stay closed",
+    "lip": "this lip has no edge of its own: it moves as a line and cannot be pressed, rolled or puckered in itself",
+    "eye": "these lids are one surface without an opening: they cannot open or close over an eye",
+}
+
+
+@cache
+def average_face() -> dict[str, Array]:
+    """Return name -> place (3,), mm, of the base face's landmarks."""
+    from facegen.face.face import load_face
+
+    face = load_face()
+    return face.landmark_points(face.mesh(0).vertices, detail=0)
+
+
+def check_faces(names: Sequence[str], corners: NDArray, weights: Array, mesh: Mesh) -> None:
+    """Raise InputError if landmarks do not fit a mesh's shape: corners it does not have, or what is not finite."""
+    if corners.shape != (len(names), 3) or weights.shape != (len(names), 3) or not np.isfinite(weights).all():
+        raise InputError(f"landmarks: expected three corners and three finite weights for each of {len(names)} names")
+    if len(names) and not 0 <= corners.min() <= corners.max() < len(mesh.vertices):
+        raise InputError(f"landmarks: use vertex {corners.max()}, the mesh has {len(mesh.vertices)}: "
+                         "they belong to another mesh")
+    if not np.isfinite(mesh.vertices).all():
+        raise InputError("mesh: expected finite vertices")
+
+
+def place_faults(names: Sequence[str], corners: NDArray, weights: Array, mesh: Mesh) -> tuple[list[str], list[str]]:
+    """Return (errors, warnings) about landmarks on a mesh. Rules that build on others stop where those fail."""
+    vertices = mesh.vertices
+    p = dict(zip(names, np.einsum("kc,kci->ki", weights, vertices[corners]), strict=True))
+    errors, warnings = _coincidences(p, corners, weights, mesh)
+    errors += _on_pieces(names, corners, weights, mesh)
+    errors += [] if errors else _touching(p, corners, weights, mesh)
+    if errors:
+        return errors, warnings
+    for rule in (_shape, _sides, _order):
+        more_errors, more_warnings = rule(p, mesh)
+        warnings += more_warnings
+        if more_errors:
+            return more_errors, warnings
+    return _positions(p)[0], warnings + _positions(p)[1]
+
+
+# -- on the surface ------------------------------------------------------------------------------------------------
+def _coincidences(p: dict[str, Array], corners: NDArray, weights: Array, mesh: Mesh) -> tuple[list[str], list[str]]:
+    """Two names on one place. Closed lips and lids touch, and are still two surfaces: then nothing is wrong."""
+    names, places = list(p), np.array(list(p.values()))
+    extent = np.linalg.norm(np.ptp(places, axis=0))
+    apart = np.sqrt(((places[:, None] - places) ** 2).sum(axis=2))
+    # The vertices that a place rests on, one number for those a UV seam has split.
+    _, same_vertex = weld(mesh.vertices, mesh.faces)
+    rests = [frozenset(same_vertex[c[w > 1e-6]].tolist()) for c, w in zip(corners, weights, strict=True)]
+    errors, warnings = [], []
+    for i, j in zip(*np.nonzero(np.triu(apart <= _SAME * extent, 1)), strict=True):
+        what = _COINCIDE.get(frozenset({names[i], names[j]}))
+        if what is None:
+            errors.append(f"'{names[i]}' and '{names[j]}' lie on one place; give each its own")
+        elif rests[i] == rests[j]:
+            warnings.append(f"'{names[i]}' and '{names[j]}' lie on one place: {_CANNOT[what]}")
+    return errors, warnings
+
+
+def _on_pieces(names: Sequence[str], corners: NDArray, weights: Array, mesh: Mesh) -> list[str]:
+    """Lids and lips that were set on what lies behind them, going by the names of parts and materials."""
+    label = np.array([[kind_of_name(part), kind_of_name(material)] for part in mesh.parts
+                      for material in mesh.materials] or [["", ""]]).reshape(len(mesh.parts), -1, 2)
+    errors, own = [], {}
+    for name, c, w in zip(names, corners, weights, strict=True):
+        if name.startswith(("mouth_", "eye_")) and not name.startswith("eye_center"):
+            touching = np.isin(mesh.faces, c[w > 1e-6]).sum(axis=1) >= (w > 1e-6).sum()
+            kinds = label[mesh.face_parts[touching], mesh.face_materials[touching]]
+            # One skin-like triangle is enough: where skin and eye are one mesh, the margin belongs to both.
+            inside = [next((k for k in kind if k in INSIDE), "") for kind in kinds]
+            behind = {"eye": {"eye"}, "mouth": {"teeth", "tongue"}}[name.split("_")[0]]
+            if inside and all(kind in behind for kind in inside):
+                row = np.flatnonzero(touching)[0]
+                own.setdefault(mesh.parts[mesh.face_parts[row]], []).append(f"'{name}'")
+    for part, wrong in own.items():
+        errors.append(f"{', '.join(wrong)} {'lie' if len(wrong) > 1 else 'lies'} on '{part}'; set "
+                      f"{'them' if len(wrong) > 1 else 'it'} on the skin: on the margin of the lid or the edge of the "
+                      "lip, not on what lies behind")
+    return errors
+
+
+def _touching(p: dict[str, Array], corners: NDArray, weights: Array, mesh: Mesh) -> list[str]:
+    """Closed lips and lids whose landmarks are swapped: places that touch, told apart by the surface round each."""
+    extent = np.linalg.norm(np.ptp(np.array(list(p.values())), axis=0))
+    row = {name: i for i, name in enumerate(p)}
+    errors = []
+    for pair, what in _COINCIDE.items():
+        high, low = sorted(pair, key=lambda name: "top" not in name and "upper" not in name)
+        if what == "lip" or not pair <= row.keys() or np.linalg.norm(p[high] - p[low]) > _TOUCHES * extent:
+            continue
+        up = p["mouth_top"] - p["mouth_bottom"] if what == "mouth" else p[f"brow_mid_{low[-1]}"] - p[low]
+        around = []
+        for name in (high, low):
+            own = corners[row[name]][weights[row[name]] > 1e-6]
+            touching = np.isin(mesh.faces, own).sum(axis=1) >= len(own)
+            around.append(float((mesh.vertices[mesh.faces[touching]].mean(axis=(0, 1)) - p[name]) @ up))
+        if around[0] < 0 < around[1]:
+            errors.append(f"'{high}' and '{low}' are swapped: the first is on what lies above the slit")
+    return errors
+
+
+# -- the whole set -------------------------------------------------------------------------------------------------
+def _shape(p: dict[str, Array], mesh: Mesh) -> tuple[list[str], list[str]]:
+    """Whether the places form a face at all: how much of them a similarity, mirrored or not, leaves unexplained."""
+    left = min(_unexplained(p, mirror) for mirror in (1.0, -1.0))
+    if left > _NO_FACE:
+        return ["they do not form a face: the landmarks were made for another mesh, or their vertices are numbered "
+                "otherwise there (counted from 0, in the file's own order)"], []
+    if left > _HARDLY_A_FACE:
+        return [], ["the landmarks form an unusual face; look at a picture of the result"]
+    return [], []
+
+
+def _unexplained(p: dict[str, Array], mirror: float) -> float:
+    """Return the Procrustes distance (0 to 1) to the average face, by proper rotations of its (mirrored) image."""
+    from facegen.face.landmarks import REQUIRED
+
+    names = [name for name in p if name in REQUIRED]
+    if len(names) < 4:
+        return 0.0
+    x = np.array([p[name] for name in names])
+    y = np.array([average_face()[name] for name in names]) * [mirror, 1.0, 1.0]
+    x, y = x - x.mean(axis=0), y - y.mean(axis=0)
+    u, s, vt = np.linalg.svd(x.T @ y)
+    s[2] *= np.sign(np.linalg.det(u) * np.linalg.det(vt))
+    return float(1.0 - s.sum() ** 2 / ((x**2).sum() * (y**2).sum()))
+
+
+@dataclass(frozen=True)
+class _Frame:
+    """The face's own axes: ``x`` from right to left, ``y`` up, ``z`` out; ``middle`` (3,) and ``unit``, the distance
+    between the eyes."""
+
+    x: Array
+    y: Array
+    z: Array
+    middle: Array
+    unit: float
+
+    def at(self, place: Array) -> Array:
+        """Return a place in the face's axes and units."""
+        return np.array([self.x, self.y, self.z]) @ (place - self.middle) / self.unit
+
+
+def _pairs(p: dict[str, Array]) -> list[str]:
+    return [name[:-2] for name in p if name.endswith("_L") and f"{name[:-2]}_R" in p]
+
+
+def _frame(p: dict[str, Array]) -> _Frame:
+    """Return the axes that most pairs agree on: a swapped one changes nothing."""
+    pairs = [name for name in _pairs(p) if name.startswith(("eye", "brow", "nose", "mouth"))]
+    across = np.array([p[f"{name}_L"] - p[f"{name}_R"] for name in pairs])
+    x = np.linalg.svd(across, full_matrices=False)[2][0]
+    x = x if np.sign(across @ x).sum() > 0 or (np.sign(across @ x).sum() == 0 and (across @ x).sum() > 0) else -x
+    middle = np.median([(p[f"{name}_L"] + p[f"{name}_R"]) / 2 for name in pairs], axis=0)
+    eyes = [_eye(p, s) for s in "LR"]
+    lips = (p["mouth_top"] + p["mouth_bottom"] + p["mouth_corner_L"] + p["mouth_corner_R"]) / 4
+    y = (eyes[0] + eyes[1]) / 2 - lips
+    y = y - x * (x @ y)
+    unit = float(np.linalg.norm(eyes[0] - eyes[1]))
+    y = y / max(np.linalg.norm(y), 1e-300)
+    return _Frame(x, y, np.cross(x, y), middle, max(unit, 1e-300))
+
+
+def _eye(p: dict[str, Array], s: str) -> Array:
+    return (p[f"eye_inner_{s}"] + p[f"eye_outer_{s}"] + p[f"eye_upper_{s}"] + p[f"eye_lower_{s}"]) / 4
+
+
+def _sides(p: dict[str, Array], mesh: Mesh) -> tuple[list[str], list[str]]:
+    """Left and right: pairs against the others, and the whole set against the way the face looks."""
+    frame = _frame(p)
+    against = [name for name in _pairs(p) if (p[f"{name}_L"] - p[f"{name}_R"]) @ frame.x < 0]
+    if against:
+        listed = ", ".join(f"'{name}_L' and '{name}_R'" for name in against)
+        return [f"{listed} are swapped: _L is the subject's own left, on the right of a picture of the face"], []
+    # Three witnesses of which way is out: the nose, the skin's normals, and where the head's bulk is.
+    rim = [p[name] for s in "LR" for name in (f"eye_outer_{s}", f"mouth_corner_{s}")]
+    nose = float(frame.at(p["nose_tip"])[2] - np.mean([frame.at(one)[2] for one in rim]))
+    core = np.array([place for name, place in p.items() if name.startswith(("eye", "brow", "nose", "mouth", "chin"))])
+    centre, reach = core.mean(axis=0), 1.5 * np.linalg.norm(np.ptp(core, axis=0))
+    used = mesh.vertices[np.unique(mesh.faces)]
+    near = used[((used - centre) ** 2).sum(axis=1) < reach**2]
+    bulk = float((centre - near.mean(axis=0)) @ frame.z / frame.unit) if len(near) else 0.0
+    outward = float(np.mean(_normals_at(core, mesh) @ frame.z))
+    votes = [np.sign(v) if abs(v) > least else 0.0 for v, least in ((nose, 0.05), (bulk, 0.05), (outward, 0.1))]
+    if sum(votes) < 0:
+        return ["left and right are swapped in all landmarks (or the mesh is mirrored): the face would look backwards; "
+                "_L is the subject's own left, on the right of a picture of the face"], []
+    if votes[0] < 0:
+        return ["'nose_tip' lies behind the eyes and the corners of the mouth; set it on the tip of the nose"], []
+    return [], []
+
+
+def _normals_at(places: Array, mesh: Mesh) -> Array:
+    """Return the normals (k, 3) of the vertices nearest to places."""
+    from scipy.spatial import cKDTree
+
+    used = np.unique(mesh.faces)
+    return vertex_normals(mesh.vertices, mesh.faces)[used[cKDTree(mesh.vertices[used]).query(places)[1]]]
+
+
+# -- one part at a time --------------------------------------------------------------------------------------------
+def _order(p: dict[str, Array], mesh: Mesh) -> tuple[list[str], list[str]]:
+    frame = _frame(p)
+    errors, warnings = [], []
+    for s in "LR":
+        errors += _eye_order(p, s, frame)
+    more_errors, more_warnings = _mouth_order(p)
+    return errors + more_errors, warnings + more_warnings
+
+
+def _eye_order(p: dict[str, Array], s: str, frame: _Frame) -> list[str]:
+    """Corners, lids and brow of one eye. From outside, inner -> outer -> upper runs one way round in each eye."""
+    inner, outer, upper, lower = (p[f"eye_{name}_{s}"] for name in ("inner", "outer", "upper", "lower"))
+    side = 1.0 if s == "L" else -1.0
+    outward = _eye(p, s) - (_eye(p, "L") + _eye(p, "R")) / 2 + frame.unit * frame.z
+    turn = side * np.cross(outer - inner, upper - lower)
+    size = np.linalg.norm(outer - inner) * np.linalg.norm(upper - lower) * np.linalg.norm(outward)
+    turned = float(turn @ outward) / size if size > 0 else 0.0
+    across = side * float((outer - inner) @ frame.x) / max(float(np.linalg.norm(outer - inner)), 1e-300)
+    if turned < -_CLEAR and across < 0:
+        return [f"'eye_inner_{s}' and 'eye_outer_{s}' are swapped: the inner corner is the one beside the nose"]
+    if turned < -_CLEAR:
+        return [f"'eye_upper_{s}' lies below 'eye_lower_{s}'; swap them"]
+    if across < -0.5 and turned > _CLEAR:
+        return [f"'eye_inner_{s}' and 'eye_outer_{s}', and 'eye_upper_{s}' and 'eye_lower_{s}', are swapped"]
+    errors = []
+    width = max(float(np.linalg.norm(outer - inner)), 1e-300)
+    up = upper - lower
+    # A closed or painted eye has no height: up is then at right angles to its corners.
+    up = up if np.linalg.norm(up) > 0.02 * width else np.cross(outward, (outer - inner) * side)
+    up = up - (outer - inner) * (up @ (outer - inner)) / width**2
+    up = up / max(np.linalg.norm(up), 1e-300)
+    heights = {name: float((p[f"brow_{name}_{s}"] - _eye(p, s)) @ up) / width for name in ("inner", "mid", "outer")}
+    if heights["mid"] < 0 or min(heights.values()) < -0.75:
+        low = min(heights, key=heights.get)
+        errors.append(f"'brow_{low}_{s}' lies below 'eye_upper_{s}'; brows lie above the eye, on the side of its upper "
+                      "lid")
+    if side * float((p[f"brow_outer_{s}"] - p[f"brow_inner_{s}"]) @ frame.x) < -0.3 * width:
+        errors.append(f"'brow_inner_{s}' and 'brow_outer_{s}' are swapped: the inner end is the one beside the nose")
+    return errors
+
+
+def _mouth_order(p: dict[str, Array]) -> tuple[list[str], list[str]]:
+    """Nose, upper lip, lower lip and chin, in this order along the way from nose to chin."""
+    lips = (p["mouth_top"] + p["mouth_bottom"] + p["mouth_corner_L"] + p["mouth_corner_R"]) / 4
+    nose, chin = p["nose_tip"] - lips, p["chin"] - lips
+    length = max(float(np.linalg.norm(p["nose_tip"] - p["chin"])), 1e-300)
+    if float(nose @ chin) > 0.6 * np.linalg.norm(nose) * np.linalg.norm(chin):
+        return ["'nose_tip' and 'chin' lie on the same side of the mouth; the chin is below the lower lip"], []
+    down = (p["chin"] - p["nose_tip"]) / length
+    order = ("mouth_top", "mouth_inner_top", "mouth_inner_bottom", "mouth_bottom")
+    others = tuple(f"{name}_{s}" for name in ("nose_wing", "mouth_corner") for s in "LR")
+    along = {name: float((p[name] - p["nose_tip"]) @ down) / length for name in (*order, *others)}
+    errors, warnings = [], []
+    if along["mouth_top"] > along["mouth_bottom"]:
+        errors.append("'mouth_top' lies under 'mouth_bottom'; swap them: top is the upper lip's outer edge")
+    elif along["mouth_inner_top"] > along["mouth_inner_bottom"] + 0.02:
+        errors.append("'mouth_inner_top' lies under 'mouth_inner_bottom'; swap them")
+    else:
+        for above, below in pairwise(order):
+            if along[above] > along[below] + 0.15:
+                errors.append(f"'{above}' lies below '{below}'")
+            elif along[above] > along[below] + 0.05:
+                warnings.append(f"'{above}' lies below '{below}'; is that meant?")
+    if along["mouth_bottom"] > 1.1:
+        errors.append("'chin' lies above 'mouth_bottom'; the chin is below the lower lip")
+    if np.linalg.norm(nose) > 1.1 * np.linalg.norm(p["nose_bridge"] - lips):
+        errors.append("'nose_tip' lies farther from the mouth than 'nose_bridge'; swap them")
+    errors += [f"'nose_wing_{s}' lies below 'mouth_corner_{s}'" for s in "LR"
+               if along[f"nose_wing_{s}"] > along[f"mouth_corner_{s}"] + 0.1]
+    return errors, warnings
+
+
+def _positions(p: dict[str, Array]) -> tuple[list[str], list[str]]:
+    """Single places that slipped: against their partner's mirror image, and against the average face."""
+    errors, warnings = [], []
+    frame = _frame(p)
+    average = average_face()
+    found = align(p, average)
+    misfit = {name: float(np.linalg.norm(found.apply(p[name]) - average[name])) for name in p if name in average}
+    usual = float(np.median(list(misfit.values()))) if misfit else 0.0
+    for name in _pairs(p):
+        left, right = frame.at(p[f"{name}_L"]), frame.at(p[f"{name}_R"])
+        odd = float(np.linalg.norm(left * [-1, 1, 1] - right))
+        worse = max((f"{name}_L", f"{name}_R"), key=lambda one: misfit.get(one, 0.0))
+        other = f"{name}_{'R' if worse.endswith('L') else 'L'}"
+        if odd > _WRONG_MIRROR:
+            errors.append(f"'{worse}' is on the wrong part of the face: far from the mirror image of '{other}'")
+        elif odd > _ODD_MIRROR:
+            warnings.append(f"'{worse}' is far from the mirror image of '{other}'; is that meant?")
+    for name, place in p.items():
+        if name.endswith(("_L", "_R")):
+            continue
+        off = abs(float(frame.at(place)[0]))
+        if off > _WRONG_MIDDLE:
+            errors.append(f"'{name}' is on the wrong part of the face: it belongs between left and right")
+        elif off > _ODD_MIDDLE:
+            warnings.append(f"'{name}' is beside the middle of the face; is that meant?")
+    told = " ".join(errors + warnings)
+    warnings += [f"'{name}' is far from where most faces have it; is that meant?" for name, off in misfit.items()
+                 if off > max(_FAR, _FAR_TIMES * usual) and f"'{name}'" not in told]
+    return errors, warnings
