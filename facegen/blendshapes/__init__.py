@@ -1,1 +1,1 @@
-"""Named shapes: the vocabularies of faces (action units, ARKit, visemes, VRM), what each shape is made of, and names."""
+"""Named shapes: the vocabularies of faces (units, ARKit, visemes, VRM), what each shape is made of, their names."""

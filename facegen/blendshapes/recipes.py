@@ -18,7 +18,7 @@ from facegen.data import tables_dir
 from facegen.errors import FacegenError, InputError, TableError, nearest
 from facegen.facs.deformation import Deformation, deformation_from_entry, weighted_sum
 from facegen.facs.expression_table import Person, load_expressions, load_person
-from facegen.facs.notation import parse
+from facegen.facs.notation import canonical, parse
 from facegen.facs.rules import symmetric
 from facegen.facs.tables import load_units
 from facegen.facs.validate import Entry
@@ -43,12 +43,13 @@ class Recipe:
         the shape that this one corrects: ``shape = pose(deformation) - pose(deformation of minus)``, to be added to
         that shape at full weight.
     members: member of the unit table's basis -> coefficient, if the shape is nothing else; else empty.
-    set, about, source: where it belongs, what is seen, where that comes from. also: what other people call it.
+    script: the recipe as the table has it, to be read. set, about, source: where it belongs, what is seen, where that comes from. also: what other people call it.
     """
 
     deformation: tuple[Deformation, ...]
     minus: str | None = None
     members: Mapping[str, float] = field(default_factory=dict, hash=False)
+    script: str = ""
     set: str = ""
     about: str = ""
     source: str = ""
@@ -58,7 +59,8 @@ class Recipe:
         object.__setattr__(self, "members", MappingProxyType(dict(self.members)))
 
     def __reduce__(self) -> tuple:                  # mapping proxies cannot be pickled
-        return Recipe, (self.deformation, self.minus, dict(self.members), self.set, self.about, self.source, self.also)
+        return Recipe, (self.deformation, self.minus, dict(self.members), self.script, self.set, self.about,
+                        self.source, self.also)
 
 
 def shape_set(name: str, person: str | Path | Person | None = None) -> dict[str, Recipe]:
@@ -105,7 +107,7 @@ def _units() -> Mapping[str, Recipe]:
             continue
         unit = table.catalogue.units.get(member.lstrip("LRTB"))
         about = unit.effect if unit else f"corrects {member.partition(':')[0].replace('+', ' with ')}"
-        made[shape_of(member)] = Recipe((deformation,), None, {member: 1.0}, "units", about,
+        made[shape_of(member)] = Recipe((deformation,), None, {member: 1.0}, member, "units", about,
                                         unit.source if unit else table.source)
     return made
 
@@ -117,7 +119,7 @@ def _expressions(person: str | Path | Person | None) -> dict[str, Recipe]:
     table, made = load_units(), {}
     for name, one in found.items():
         members = {member: value for member, value in table.coefficients(one.units).items() if not is_head(member)}
-        made[name] = Recipe((_sum(members),), None, members, "expressions", one.about, one.source)
+        made[name] = Recipe((_sum(members),), None, members, canonical(one.units), "expressions", one.about, one.source)
     return made
 
 
@@ -167,7 +169,8 @@ class _Set:
             members = {_mirrored(m): value for m, value in one.members.items()}
             if not set(members) <= set(load_units().basis) or _sum(members) != image:
                 members = {}                            # the mirror image of a turn to the left is another unit
-            return replace(one, deformation=(image,), members=members, about=_swapped(one.about), also=also)
+            return replace(one, deformation=(image,), members=members, about=_swapped(one.about), also=also,
+                           script=f"mirror image of {other}")
         if "about" not in fields:
             raise entry.fail("the key 'about' is missing")
         members = self._members(fields)
@@ -183,7 +186,7 @@ class _Set:
         if "corrects" in fields:
             minus = self._other(fields["corrects"], shape)
             made = _added(entry, made, *self._recipe(minus).deformation)
-        return Recipe((made,), minus, members, self.name, fields["about"].text(), self.source, also)
+        return Recipe((made,), minus, members, _script(fields), self.name, fields["about"].text(), self.source, also)
 
     def _members(self, fields: Mapping[str, Entry]) -> dict[str, float]:
         """Return the coefficients of an entry's units and jaw."""
@@ -208,6 +211,16 @@ class _Set:
         if other == shape or {"mirror_of", "corrects"} & set(dict(self.entries[other].items())):
             raise entry.fail("expected a shape that is written out")
         return other
+
+
+def _script(fields: Mapping[str, Entry]) -> str:
+    """Return an entry's recipe in words."""
+    said = [f"{fields[key].value}" for key in ("units",) if key in fields]
+    if "half" in fields:
+        said[-1:] = [f"{said[-1] if said else ''} {({'L': 'left', 'R': 'right'})[fields['half'].value]} half".strip()]
+    said += [f"jaw {fields['jaw'].value:g}"] if "jaw" in fields else []
+    said += ["raw data"] if {"both", "add"} & set(fields) else []
+    return ", ".join(said) + (f", with {fields['corrects'].value}" if "corrects" in fields else "")
 
 
 def half(deformation: Deformation, side: str) -> Deformation:

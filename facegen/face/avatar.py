@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import numbers
 from collections.abc import Mapping
+from dataclasses import replace
 from functools import cache, cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -72,7 +73,8 @@ class AvatarFace:
         self.colours: Mapping[str, tuple[float, float, float]] = dict(avatar.colours)
         self.notes: Notes = read_notes(avatar.notes, str(avatar.path))
         self._file = avatar
-        self._mesh = avatar.mesh.with_vertices(self.notes.apply(avatar.mesh.vertices))
+        self._mesh = replace(avatar.mesh, vertices=self.notes.apply(avatar.mesh.vertices),
+                             colours=avatar.vertex_colours)
         self._moves: dict[str, tuple[NDArray[np.int64], Array]] = {}
         self._fitted: dict[Any, tuple[dict[str, float], float]] = {}
 
@@ -188,8 +190,8 @@ class AvatarFace:
         key = (tuple(members.items()), raw)
         if key not in self._fitted:
             if not self.known:
-                raise InputError(f"face: none of the {len(self.shapes)} blendshapes of {self.path.name} has a name that "
-                                 "is understood (units such as AU12_L, ARKit, visemes, VRM, expressions); rename them, "
+                raise InputError(f"face: none of the {len(self.shapes)} blendshapes of {self.path.name} has a name "
+                                 "that is understood (units such as AU12_L, ARKit, visemes, VRM, expressions); rename them, "
                                  "or rig the neutral: facegen rig")
             fitted, lost = self._made_of.fitted(_held(members), raw_movement(raw) if raw else None)
             by_shape = {shape: name for name, (shape, _) in self.known.items()}
@@ -201,7 +203,7 @@ class AvatarFace:
     @cached_property
     def _made_of(self) -> Shapes:
         """The shapes that poses are made of: units if there are all, else whatever says the most."""
-        recipes = {shape: recipe for shape, recipe in self.known.values()}
+        recipes = dict(self.known.values())
         units = {shape: recipe for shape, recipe in recipes.items() if recipe.set == "units"}
         if set(units) >= _moving_units():
             return Shapes(units)

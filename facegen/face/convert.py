@@ -185,7 +185,7 @@ class Shapes:
         space = _space()
         vectors = space.vectors(self.recipes)
         for name, one in self.recipes.items():
-            if one.members:             # summed as their units are, so that an expression's units find its shape exactly
+            if one.members:             # summed as its units are, so that they find their expression exactly
                 vectors[self._rows[name]] = space.of(one.members)
         return vectors
 

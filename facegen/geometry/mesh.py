@@ -36,9 +36,10 @@ class Mesh:
             object.__setattr__(self, name, array)
         if self.colours is not None:
             colours = np.array(self.colours, dtype=np.float32, order="C")
-            if colours.shape != self.vertices.shape or not (colours.min(initial=0) >= 0 and colours.max(initial=0) <= 255):
-                raise InputError(f"colours: expected sRGB 0..255 of shape {self.vertices.shape}, got {colours.shape}"
-                                 + ("" if colours.shape != self.vertices.shape else " with values outside"))
+            if colours.shape != self.vertices.shape:
+                raise InputError(f"colours: expected shape {self.vertices.shape}, got {colours.shape}")
+            if not ((colours >= 0) & (colours <= 255)).all():
+                raise InputError("colours: expected sRGB values 0..255, got others")
             colours.flags.writeable = False
             object.__setattr__(self, "colours", colours)
         m = len(self.faces)

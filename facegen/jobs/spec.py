@@ -40,6 +40,7 @@ SETTINGS = ("format", "detail", "renderer", "orthographic", "masks", "feature_po
 _NOBODY = ("nobody", "none")        # as a person: the common tables
 _RANGES = ("yaw", "pitch", "intensity")
 _MOST_UNITS = 12
+_MOST_LOOKED_AT = 300       # poses of units that a face is asked about: a million drawn ones would take an hour
 
 
 @dataclass(frozen=True)
@@ -107,6 +108,7 @@ class _Reader:
         self.folder, self.source = folder, source
         self._meanings: dict[Any, Resolution] = {}
         self._fitting: set[Any] = set()
+        self._warnings: list[str] = []      # of faces that cannot show all of a pose
 
     def batch(self, top: Entry) -> Batch:
         """Return the whole batch."""
@@ -135,8 +137,8 @@ class _Reader:
                            "several batches")
         pictures = [picture for _, section in sections for picture in section()]
         # Said twice is drawn once; drawn ones may repeat.
-        warnings = (warning for meaning in self._meanings.values() for warning in meaning.warnings)
-        return Batch(settings, tuple(dict.fromkeys(pictures)), tuple(dict.fromkeys(warnings)))
+        warnings = [warning for meaning in self._meanings.values() for warning in meaning.warnings]
+        return Batch(settings, tuple(dict.fromkeys(pictures)), tuple(dict.fromkeys([*warnings, *self._warnings])))
 
     def _settings(self, fields: Mapping[str, Entry]) -> Settings:
         asked: dict[str, Any] = {}
@@ -256,8 +258,8 @@ class _Reader:
         pose, entry = wish["pose"]
         said = _frozen(pose)
         meaning = self._meaning(said, pose, value["person"], value["intensity"], wish)
-        if not meaning.units and (said, value["face"]) not in self._fitting:
-            self._checked(entry, lambda: load_face(value["face"]).controls(meaning.deformation))
+        if (said, value["face"]) not in self._fitting and (not meaning.units or len(self._fitting) < _MOST_LOOKED_AT):
+            self._warnings += self._checked(entry, lambda: load_face(value["face"]).check(meaning))
             self._fitting.add((said, value["face"]))
         raw = None if meaning.kind != "deformation" else _frozen(meaning.deformation.as_dict())
         return Picture(pose=pose if isinstance(pose, str) else _spoken(pose), kind=meaning.kind, caption=meaning.name,
