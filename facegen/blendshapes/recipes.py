@@ -43,7 +43,8 @@ class Recipe:
         the shape that this one corrects: ``shape = pose(deformation) - pose(deformation of minus)``, to be added to
         that shape at full weight.
     members: member of the unit table's basis -> coefficient, if the shape is nothing else; else empty.
-    script: the recipe as the table has it, to be read. set, about, source: where it belongs, what is seen, where that comes from. also: what other people call it.
+    script: the recipe as the table has it, to be read. set, about, source: where it belongs, what is seen, where
+        that comes from. also: what other people call it.
     """
 
     deformation: tuple[Deformation, ...]

@@ -25,7 +25,7 @@ MOUTHS = ("0", "25E", "26E", "27E", "12E+25E", "10E+25E", "16E+25E", "22E+25E", 
 # What a close-up looks at, mm, and how many times larger than the whole head it is drawn.
 CLOSE = {"eyes": ((0.0, 2.0, 20.0), 2.2), "mouth": ((0.0, -67.0, 20.0), 2.6)}
 # ... and on an avatar: what the landmarks there are called, and the share of the picture that they take.
-MARKS, CLOSE_SHARE = {"eyes": ("eye_", "brow_"), "mouth": ("mouth_", "chin")}, 0.6
+MARKS, CLOSE_SHARE = {"eyes": ("eye_",), "mouth": ("mouth_",)}, 0.65
 FORMATS = ("webp", "png", "jpg")
 
 Folder = Annotated[Path | None, typer.Option("--output", "-o", metavar="DIR",

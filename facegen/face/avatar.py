@@ -191,8 +191,8 @@ class AvatarFace:
         if key not in self._fitted:
             if not self.known:
                 raise InputError(f"face: none of the {len(self.shapes)} blendshapes of {self.path.name} has a name "
-                                 "that is understood (units such as AU12_L, ARKit, visemes, VRM, expressions); rename them, "
-                                 "or rig the neutral: facegen rig")
+                                 "that is understood (units such as AU12_L, ARKit, visemes, VRM, expressions); "
+                                 "rename them, or rig the neutral: facegen rig")
             fitted, lost = self._made_of.fitted(_held(members), raw_movement(raw) if raw else None)
             by_shape = {shape: name for name, (shape, _) in self.known.items()}
             if len(self._fitted) >= _KEPT:

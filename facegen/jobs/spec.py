@@ -107,6 +107,7 @@ class _Reader:
     def __init__(self, folder: Path, source: str) -> None:
         self.folder, self.source = folder, source
         self._meanings: dict[Any, Resolution] = {}
+        self._points = False
         self._fitting: set[Any] = set()
         self._warnings: list[str] = []      # of faces that cannot show all of a pose
 
@@ -114,6 +115,7 @@ class _Reader:
         """Return the whole batch."""
         fields = top.fields(optional=(*LISTS, *SETTINGS, "pictures", "products", "random"))
         settings = self._settings(fields)
+        self._points = settings.feature_points
         own = {key: fields[key] for key in LISTS if key in fields}
         sections: list[tuple[int, Callable[[], Iterator[Picture]]]] = []
         if "poses" in own:
@@ -235,7 +237,10 @@ class _Reader:
             face = name if name in face_names() else str((self.folder / name).resolve())
             if face != name and not Path(face).exists():
                 entry.choice(face_names(), "face")
-            self._checked(entry, lambda: load_face(face))
+            rig = self._checked(entry, lambda: load_face(face))
+            if self._points and not hasattr(rig, "feature_point_places"):
+                raise entry.fail(f"feature_points: {rig.name} is an avatar and has none, only landmarks; leave "
+                                 "feature_points out or take the base face")
             return face
         if key == "light":
             return entry.choice(light_names(), "light")

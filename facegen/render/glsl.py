@@ -117,7 +117,7 @@ def vertex_shader(slots: Sequence[int], shares: int, materials: NDArray, *, tint
 
 
 def fragment_shader(scene: Scene, inside: NDArray, *, tinted: bool = False) -> str:
-    """Return the fragment shader; ``inside`` (3,): the linear colour of back faces; ``tinted``: vertices have their own."""
+    """Return the fragment shader; ``inside`` (3,) is the linear colour of back faces."""
     shares = 1 + len(scene.lights)
     lamps = [f"lamp({_vector(way)}, {_vector(light.colour)}, {_number(light.highlight)}, share[{k}]);"
              for k, (way, light) in enumerate(zip(shading.light_directions(scene), scene.lights, strict=True), start=1)]
