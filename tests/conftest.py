@@ -21,6 +21,7 @@ def rig_of():
     """Return a function: sets of shapes -> AvatarFile of the base face, in metres or as told."""
     face = load_face()
     mesh = face.mesh(RIG_DETAIL)
+    pieces = {part: "skull" if part in ("hair", "brows") else part for part in mesh.parts}
     marks = face.landmark_points(mesh.vertices, detail=RIG_DETAIL)
 
     def make(*sets: str, notes: bool = True, scale: float = 1e-3, rotation=None, offset=(0.0, 0.0, 0.0),
@@ -38,7 +39,7 @@ def rig_of():
                     "offset": (-(1 / scale) * (turn.T @ np.asarray(offset))).tolist()}
             written = {"version": 1, "frame": back, "sets": list(sets), "neck": there(NECK).tolist(),
                        "landmarks": {mark: there(at).tolist() for mark, at in marks.items()},
-                       "shapes": {rename(shape): {"set": one.set} for shape, one in recipes.items()}, "pieces": {}}
+                       "shapes": {rename(shape): {"set": one.set} for shape, one in recipes.items()}, "pieces": pieces}
         return AvatarFile(Path(f"{name}.glb"), "glb", mesh.with_vertices(there(mesh.vertices)),
                           shapes={rename(shape): scale * (motion[row] @ turn.T) for row, shape in enumerate(recipes)},
                           notes=written, digest="0" * 64, colours=colours or {})

@@ -21,7 +21,7 @@ from scipy import sparse
 from facegen.blendshapes.names import match, shape_of
 from facegen.blendshapes.recipes import CLASH, Recipe, is_head, shape_set
 from facegen.errors import InputError, nearest
-from facegen.face.attach import attach
+from facegen.face.avatar_landmarks import placing
 from facegen.face.avatar_notes import Notes, read_notes
 from facegen.face.convert import Shapes, raw_movement
 from facegen.face.face import load_face
@@ -52,6 +52,7 @@ _HEAD_LOW, _HEAD_HIGH, _ROOM = np.array([-100.0, -150.0, -160.0]), np.array([100
 _CLOSERS = 0.5
 _TOUCH = 1e-9           # rounding of a sum that is one
 _MOUTH_WIDTH = 44.8     # mm, of the base face: what lengths of raw data are fractions of, where no landmarks tell
+_WIDEST = "27"          # the unit that opens the jaw as far as it goes
 _KEPT = 256             # poses whose weights are remembered
 
 
@@ -194,10 +195,9 @@ class AvatarFace:
                                  "that is understood (units such as AU12_L, ARKit, visemes, VRM, expressions); "
                                  "rename them, or rig the neutral: facegen rig")
             fitted, lost = self._made_of.fitted(_held(members), raw_movement(raw) if raw else None)
-            by_shape = {shape: name for name, (shape, _) in self.known.items()}
             if len(self._fitted) >= _KEPT:
                 self._fitted.clear()
-            self._fitted[key] = {by_shape[shape]: weight for shape, weight in fitted.items()}, lost
+            self._fitted[key] = self._by_name(fitted), lost
         return self._fitted[key]
 
     @cached_property
@@ -222,11 +222,19 @@ class AvatarFace:
 
     @cached_property
     def _landmark_weights(self) -> sparse.csr_array:
-        places = np.array(list(self.notes.landmarks.values())).reshape(-1, 3)
-        if not len(places):
-            return sparse.csr_array((0, len(self._mesh.vertices)))
-        identity = sparse.csr_array(sparse.identity(len(self._mesh.vertices), format="csr"))
-        return sparse.csr_array(attach(places, self._mesh.vertices, self._mesh.faces, identity))
+        return placing(self.notes, self._mesh, self._opened)
+
+    def _opened(self) -> Array | None:
+        """Return how the vertices move when the jaw opens, mm, or None if no shape does that."""
+        weights, left = self._made_of.read_off({_WIDEST: 1.0}) if self.known else ({}, {_WIDEST: 1.0})
+        if left:
+            return None
+        return self.pose_shapes(self._by_name(weights)) - self._mesh.vertices
+
+    def _by_name(self, weights: Mapping[str, float]) -> dict[str, float]:
+        """Return weights by the file's own names for weights by the shapes that they are."""
+        names = {shape: name for name, (shape, _) in self.known.items()}
+        return {names[shape]: weight for shape, weight in weights.items()}
 
     @cached_property
     def _mouth_width(self) -> float:
@@ -240,7 +248,7 @@ class AvatarFace:
     @cached_property
     def _neck_weight(self) -> Array:
         weight = neck_weight(self._mesh.vertices, self._pivot + _MOVES_ABOVE, self._pivot + _RESTS_BELOW)
-        for part in set(self.notes.body) & set(self._mesh.parts):
+        for part in set(self.notes.parts("body")) & set(self._mesh.parts):
             weight[self._mesh.part_vertices(part)] = 0.0
         return weight
 

@@ -26,8 +26,8 @@ class Notes:
 
     ``scale``, ``rotation`` (3, 3), ``offset`` (3,): y = scale * rotation @ x + offset. ``framed``: whether the file
     says so, or that of glTF is assumed. ``landmarks``: name -> place (3,) in millimetres. ``neck``: where the head
-    turns, millimetres, or None. ``sets``: shape -> the set it belongs to. ``body``: parts that do not turn with the
-    head.
+    turns, millimetres, or None. ``sets``: shape -> the set it belongs to. ``pieces``: part -> what it is ("skin",
+    "eye_L", "body" ...), as far as noted.
     """
 
     scale: float = METRE
@@ -37,7 +37,11 @@ class Notes:
     landmarks: Mapping[str, Array] = field(default_factory=dict)
     neck: Array | None = None
     sets: Mapping[str, str] = field(default_factory=dict)
-    body: tuple[str, ...] = ()
+    pieces: Mapping[str, str] = field(default_factory=dict)
+
+    def parts(self, *kinds: str) -> tuple[str, ...]:
+        """Return the parts whose kind begins with one of these."""
+        return tuple(part for part, kind in self.pieces.items() if kind.startswith(kinds))
 
     def apply(self, points: Array) -> Array:
         """Return places (..., 3) of the file in millimetres."""
@@ -71,9 +75,10 @@ def read_notes(notes: Mapping, source: str) -> Notes:
         known = dict(entry.items())
         if "set" in known and known["set"].value in SETS:
             sets[shape] = known["set"].value
-    body = tuple(part for part, entry in top["pieces"].items() if entry.value == "body") if "pieces" in top else ()
+    pieces = {part: entry.value for part, entry in top["pieces"].items() if isinstance(entry.value, str)} \
+        if "pieces" in top else {}
     return Notes(scale, rotation, offset, framed, {name: landmarks[name] for name in NAMES if name in landmarks},
-                 place(top["neck"]) if "neck" in top and top["neck"].value is not None else None, sets, body)
+                 place(top["neck"]) if "neck" in top and top["neck"].value is not None else None, sets, pieces)
 
 
 def _rotation(entry: Entry) -> Array:

@@ -15,16 +15,22 @@ from facegen.facs.expression_table import load_expressions
 from facegen.facs.tables import load_units
 
 # Apple, ARFaceAnchor.BlendShapeLocation, in the order of its documentation.
-APPLE = """eyeBlinkLeft eyeLookDownLeft eyeLookInLeft eyeLookOutLeft eyeLookUpLeft eyeSquintLeft eyeWideLeft eyeBlinkRight
-eyeLookDownRight eyeLookInRight eyeLookOutRight eyeLookUpRight eyeSquintRight eyeWideRight jawForward jawLeft jawRight
-jawOpen mouthClose mouthFunnel mouthPucker mouthLeft mouthRight mouthSmileLeft mouthSmileRight mouthFrownLeft
-mouthFrownRight mouthDimpleLeft mouthDimpleRight mouthStretchLeft mouthStretchRight mouthRollLower mouthRollUpper
-mouthShrugLower mouthShrugUpper mouthPressLeft mouthPressRight mouthLowerDownLeft mouthLowerDownRight mouthUpperUpLeft
-mouthUpperUpRight browDownLeft browDownRight browInnerUp browOuterUpLeft browOuterUpRight cheekPuff cheekSquintLeft
-cheekSquintRight noseSneerLeft noseSneerRight tongueOut""".split()
-OCULUS = "sil PP FF TH DD kk CH SS nn RR aa E I O U".split()
-VRM = ("happy angry sad relaxed surprised neutral aa ih ou ee oh blink blinkLeft blinkRight lookUp lookDown lookLeft "
-       "lookRight").split()
+APPLE = [
+    "eyeBlinkLeft", "eyeLookDownLeft", "eyeLookInLeft", "eyeLookOutLeft", "eyeLookUpLeft", "eyeSquintLeft",
+    "eyeWideLeft", "eyeBlinkRight", "eyeLookDownRight", "eyeLookInRight", "eyeLookOutRight", "eyeLookUpRight",
+    "eyeSquintRight", "eyeWideRight", "jawForward", "jawLeft", "jawRight", "jawOpen", "mouthClose", "mouthFunnel",
+    "mouthPucker", "mouthLeft", "mouthRight", "mouthSmileLeft", "mouthSmileRight", "mouthFrownLeft",
+    "mouthFrownRight", "mouthDimpleLeft", "mouthDimpleRight", "mouthStretchLeft", "mouthStretchRight",
+    "mouthRollLower", "mouthRollUpper", "mouthShrugLower", "mouthShrugUpper", "mouthPressLeft", "mouthPressRight",
+    "mouthLowerDownLeft", "mouthLowerDownRight", "mouthUpperUpLeft", "mouthUpperUpRight", "browDownLeft",
+    "browDownRight", "browInnerUp", "browOuterUpLeft", "browOuterUpRight", "cheekPuff", "cheekSquintLeft",
+    "cheekSquintRight", "noseSneerLeft", "noseSneerRight", "tongueOut",
+]
+OCULUS = ["sil", "PP", "FF", "TH", "DD", "kk", "CH", "SS", "nn", "RR", "aa", "E", "I", "O", "U"]
+VRM = [
+    "happy", "angry", "sad", "relaxed", "surprised", "neutral", "aa", "ih", "ou", "ee", "oh", "blink", "blinkLeft",
+    "blinkRight", "lookUp", "lookDown", "lookLeft", "lookRight",
+]
 
 
 def test_names_and_order():
@@ -76,12 +82,12 @@ def test_pairs_mirror_exactly(left):
     right = arkit[left.removesuffix("Left") + "Right"]
     assert right.deformation == tuple(one.mirrored() for one in arkit[left].deformation)
     assert {m.translate(str.maketrans("LR", "RL")): v for m, v in arkit[left].members.items()} == right.members
-    assert " right " in f" {right.about} ".replace("nose", " right ") if "left" in arkit[left].about else True
     assert "left" not in right.about
 
 
-@pytest.mark.parametrize("shape", ["jawOpen", "jawForward", "mouthFunnel", "mouthPucker", "mouthRollLower", "mouthClose",
-                                   "mouthShrugUpper", "mouthShrugLower", "browInnerUp", "cheekPuff", "tongueOut"])
+@pytest.mark.parametrize("shape", ["jawOpen", "jawForward", "mouthFunnel", "mouthPucker", "mouthRollLower",
+                                   "mouthClose", "mouthShrugUpper", "mouthShrugLower", "browInnerUp", "cheekPuff",
+                                   "tongueOut"])
 def test_shapes_of_the_middle_are_symmetric(shape):
     for one in shape_set("arkit")[shape].deformation:
         assert one.mirrored() == one
