@@ -52,15 +52,17 @@ class Notes:
         return self.scale * (np.asarray(vectors, np.float64) @ self.rotation.T)
 
 
-def read_notes(notes: Mapping, source: str) -> Notes:
+def read_notes(notes: Mapping, source: str, *, backward: bool = False) -> Notes:
     """Return the notes of a file, checked; none: what glTF says of axes and units. TableError names the file and key.
 
-    Keys that a later facegen may add are passed over.
+    backward: whether such files look to -z where nothing else is noted. Keys that a later facegen may add are passed
+    over.
     """
+    ahead = np.diag([-1.0, 1.0, -1.0]) if backward else np.eye(3)
     if not notes:
-        return Notes()
+        return Notes(rotation=ahead)
     top = dict(Entry(notes, source, "facegen").items())
-    scale, rotation, offset, framed = METRE, np.eye(3), np.zeros(3), "frame" in top
+    scale, rotation, offset, framed = METRE, ahead, np.zeros(3), "frame" in top
     if framed:
         frame = top["frame"].fields(required=("scale", "rotation", "offset"))
         scale, rotation = frame["scale"].number(1e-12, _FARTHEST), _rotation(frame["rotation"])

@@ -35,6 +35,8 @@ _COUNTS = {"skin": 1.0, "eye_L": 0.1, "eye_R": 0.1, "tongue": 0.1}
 _ROUNDS = 60
 # Members whose coefficient is less than this are spent.
 _SPENT = 1e-12
+# A movement shorter than this, in millimetres, is rounding.
+_STILL = 1e-6
 
 Members = Mapping[str, float]
 
@@ -148,7 +150,7 @@ class Shapes:
         if not left and not moves:
             return self._ordered(weights), 0.0
         total = _space().of(members) + (raw if moves else 0.0)
-        if not total.any():
+        if np.linalg.norm(total) < _STILL:
             return self._ordered(weights), 0.0
         single = self._fit.weights(total, np.ones(len(self.recipes)))
         if np.count_nonzero(single) == 1:
@@ -271,5 +273,5 @@ def _as_units(members: Members, raw: NDArray[np.float64]) -> tuple[dict[str, flo
         weights = better
     made = _space().of({k: v for k, v in table.coefficients(weights).items() if not is_head(k)})
     size = float(np.linalg.norm(total))
-    weights = {name: round(value, 12) for name, value in weights.items()}
-    return table.catalogue.fold(weights), min(1.0, float(np.linalg.norm(total - made)) / size) if size else 0.0
+    lost = min(1.0, float(np.linalg.norm(total - made)) / size) if size > _STILL else 0.0
+    return table.catalogue.fold({name: round(value, 12) for name, value in weights.items()}), lost

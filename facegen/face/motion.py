@@ -25,6 +25,7 @@ def shape_motion(face: Face, recipes: Mapping[str, Recipe], *, detail: int = 2) 
     places = {name: row for row, name in enumerate(recipes)}
     motion = posed(face, [recipe.deformation for recipe in recipes.values()], detail=detail)
     motion -= face.mesh(detail).vertices
+    motion[[not any(recipe.deformation) for recipe in recipes.values()]] = 0.0      # not even by rounding
     whole = {name: motion[places[name]].copy() for name in {r.minus for r in recipes.values()} & set(places)}
     for name, recipe in recipes.items():
         if recipe.minus is None:

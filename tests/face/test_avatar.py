@@ -97,6 +97,19 @@ def test_without_notes_the_axes_are_gltfs(face, rig_of):
     assert "does not say where its neck is" in rig.check(rig.resolve("12C+51D"))[0]
 
 
+def test_avatars_of_vrm_0_look_backward(face, rig_of):
+    from types import SimpleNamespace
+
+    one = rig_of("arkit", notes=False, rotation=np.diag([-1.0, 1.0, -1.0]))
+    source = SimpleNamespace(file=SimpleNamespace(json={"extensions": {"VRM": {}}}))
+    np.testing.assert_allclose(AvatarFace(replace(one, source=source)).mesh().vertices, face.mesh(DETAIL).vertices,
+                               atol=1e-9)
+    source = SimpleNamespace(file=SimpleNamespace(json={"extensions": {"VRMC_vrm": {}}}))
+    ahead = rig_of("arkit", notes=False)
+    np.testing.assert_allclose(AvatarFace(replace(ahead, source=source)).mesh().vertices, face.mesh(DETAIL).vertices,
+                               atol=1e-9)
+
+
 @pytest.mark.parametrize(("sets", "what", "most"), [
     (("arkit",), "6C+12D", 0.02), (("arkit",), "R12D", 0.02), (("arkit",), "L45E+61D", 0.05),
     (("arkit",), "happiness", 0.2), (("arkit",), "surprise", 0.2), (("arkit",), "27E", 1e-6),

@@ -49,7 +49,8 @@ def test_vrm_presets_are_units():
 
 
 def test_expressions():
-    assert convert({"6": 0.8, "12": 1.0, "25": 0.8}, "units", "expressions").weights == {"happiness": 1.0}
+    assert convert({"6": 0.8, "12": 1.0, "25": 0.8}, "units", "expressions").weights == {
+        "happiness": pytest.approx(1.0)}
     arkit = convert({"happiness": 1.0}, "expressions", "arkit")
     assert arkit.weights["mouthSmileLeft"] == 1.0
     assert arkit.residual < 0.2
@@ -138,6 +139,12 @@ def test_wrong_input(arguments, message):
     *three, person = arguments if len(arguments) == 4 else (*arguments, None)
     with pytest.raises(InputError, match=message):
         convert(*three, person=person)
+
+
+def test_the_neutral_loses_nothing():
+    for target in SETS:
+        assert convert({"neutral": 1.0}, "vrm", target).residual == 0.0
+        assert convert({"neutral": 1.0}, "expressions", target).weights == {}
 
 
 def test_nothing_is_nothing():

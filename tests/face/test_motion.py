@@ -106,6 +106,12 @@ def test_a_sum_of_units_is_the_pose_where_it_is_linear(face):
     np.testing.assert_allclose(face.mesh(1).vertices + made, posed, atol=0.02)
 
 
+def test_the_neutral_does_not_move(face):
+    for name, still in (("vrm", "neutral"), ("visemes", "viseme_sil")):
+        shapes = shape_set(name)
+        assert not shape_motion(face, shapes, detail=0)[list(shapes).index(still)].any()
+
+
 def test_a_corrective_needs_its_shape(face):
     alone = {"mouthClose": shape_set("arkit")["mouthClose"]}
     with pytest.raises(InputError, match="'mouthClose' corrects 'jawOpen', which is not among them"):
