@@ -27,16 +27,18 @@ def table_digests() -> dict[str, str]:
     return {name: file_digest(tables_dir() / name) for name in TABLES}
 
 
-def face_digest(face: str) -> str:
-    """Return the SHA-256 of a face's files, which are read once."""
+def face_digest(face: str, *, fresh: bool = False) -> str:
+    """Return the SHA-256 of a face's files. A parametric face's are read once, unless a ``fresh`` look is asked for."""
     if Path(face).suffix.lower() in AVATARS:
         return load_face(face).digest               # with the buffers of a .gltf, as the reader knows them
-    return _digest_of_files(face)
+    return _read(face) if fresh else kept_digest(face)
 
 
-@cache
-def _digest_of_files(face: str) -> str:
+def _read(face: str) -> str:
     return digest_of([file_digest(one) for one in face_files(face)])
+
+
+kept_digest = cache(_read)
 
 
 def face_files(face: str) -> list[Path]:

@@ -65,7 +65,7 @@ class Shot:
     def fingerprint(self) -> str:
         """A digest of everything here, and of the tables and the mesh."""
         files = [file_digest(path) for path in sorted(tables_dir().glob("*.yaml"))]
-        return digest_of([__version__, _plain(self), files, face_digest(self.face)])
+        return digest_of([__version__, _plain(self), files, face_digest(self.face, fresh=True)])
 
     def prepare(self) -> Callable[[int], NDArray[np.uint8]]:
         """Return what draws frame k; made once in a worker."""
