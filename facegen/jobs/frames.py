@@ -227,7 +227,7 @@ class _Target:
         paths = [self.folder / f"frame_{k:05d}.png" for k in range(1, shot.frames + 1)]
         tasks = [FrameTask(shot, k, path, shot.fingerprint) for k, path in enumerate(paths)]
         if workers > 1:
-            warm(shot.renderer)
+            warm(shot.renderer, coloured=load_face(shot.face).mesh(shot.detail).colours is not None)
         report = run(tasks, workers=workers, step=step)
         if self.is_film:
             save_video(_Frames(paths), self.path, fps=self.fps)
