@@ -176,7 +176,7 @@ def local_path(uri: Tree) -> Path:
 
 def glb_bytes(found: dict[str, Any], data: bytes, rest: bytes = b"") -> list[bytes]:
     """Return the pieces of a GLB file: its JSON, one binary buffer, and further chunks as they are."""
-    text = json.dumps(found, ensure_ascii=False, separators=(",", ":"), allow_nan=False).encode()
+    text = _text(found)
     text += b" " * (-len(text) % 4)
     pieces = [struct.pack("<II", len(text), _JSON), text]
     if data:
@@ -194,4 +194,12 @@ def gltf_bytes(found: dict[str, Any], data: bytes) -> list[bytes]:
     if data:
         uri = "data:application/octet-stream;base64," + base64.b64encode(data).decode()
         found = {**found, "buffers": [{**found["buffers"][0], "uri": uri}]}
-    return [json.dumps(found, ensure_ascii=False, separators=(",", ":"), allow_nan=False).encode()]
+    return [_text(found)]
+
+
+def _text(found: dict[str, Any]) -> bytes:
+    """Return JSON as UTF-8."""
+    try:
+        return json.dumps(found, ensure_ascii=False, separators=(",", ":"), allow_nan=False).encode()
+    except UnicodeEncodeError:                      # half a surrogate pair in a name: only an escape can write it
+        return json.dumps(found, separators=(",", ":"), allow_nan=False).encode()

@@ -59,7 +59,8 @@ class Inverse:
         result = {}
         for name, shape in shapes.items():
             world = shape[self.block.start:self.block.stop]
-            rows = np.flatnonzero((np.abs(world) > self.still).any(axis=1))
+            x, y, z = np.abs(world).T
+            rows = np.flatnonzero((x > self.still) | (y > self.still) | (z > self.still))
             if len(rows):
                 motion = self._turned_back(name, rows, world[rows])
                 if len(motion.rows):

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import csr_array
 
 # Because a smaller change of a unit normal changes no 8-bit pixel.
 _UNSEEN = 1e-3
@@ -26,33 +27,31 @@ class TurningNormals:
         self._normals = np.asarray(normals, dtype=np.float64)
         self._group = _smooth_groups(self._points, self._normals)
         self._faces = faces
-        self._corners = self._group[faces]                              # (m, 3) smooth vertices
-        self._angles = _angles(self._points[faces])
-        self._neutral = _unit_normals(self._points[faces])
+        corners = self._group[faces]                                    # (m, 3) smooth vertices
         self._count = int(self._group.max(initial=-1)) + 1
-        self._sum = self._gathered(self._corners, self._angles, self._neutral)
-
-    def _gathered(self, corners: NDArray, angles: NDArray, vectors: NDArray) -> NDArray[np.float64]:
-        index = corners.ravel()
-        return np.stack([np.bincount(index, (angles * vectors[:, axis, None]).ravel(), minlength=self._count)
-                         for axis in range(3)], axis=1)
+        self._neutral = _unit_normals(self._points[faces])
+        triangle = np.repeat(np.arange(len(faces)), 3)
+        self._spread = csr_array((_angles(self._points[faces]).ravel(), (corners.ravel(), triangle)),
+                                 shape=(self._count, len(faces)))
+        self._sum = self._spread @ self._neutral
 
     def change(self, rows: NDArray[np.int64], motion: NDArray) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
         """Return which normals change, ascending, and by how much (k, 3), if ``rows`` move by ``motion`` (r, 3)."""
         moved = np.zeros(len(self._points), dtype=bool)
         moved[rows] = True
-        touched = np.flatnonzero(moved[self._faces].any(axis=1))
+        a, b, c = self._faces.T
+        touched = np.flatnonzero(moved[a] | moved[b] | moved[c])
         points = self._points.copy()
         points[rows] += motion
-        turn = _unit_normals(points[self._faces[touched]]) - self._neutral[touched]
-        corners = self._corners[touched]
-        total = self._sum + self._gathered(corners, self._angles[touched], turn)
+        turn = np.zeros_like(self._neutral)
+        turn[touched] = _unit_normals(points[self._faces[touched]]) - self._neutral[touched]
+        total = self._sum + self._spread @ turn
         surface = np.zeros(self._count, dtype=bool)
-        surface[corners] = True
+        surface[self._group[self._faces[touched].ravel()]] = True
         which = np.flatnonzero(surface[self._group])
         before, after = _unit(self._sum[self._group[which]]), _unit(total[self._group[which]])
         change = _turned(self._normals[which], before, after) - self._normals[which]
-        seen = (np.abs(change) > _UNSEEN).any(axis=1)
+        seen = _dot(change, change) > _UNSEEN ** 2
         return which[seen], change[seen]
 
 
@@ -60,7 +59,7 @@ def _smooth_groups(points: NDArray, normals: NDArray) -> NDArray[np.int64]:
     """Return for each vertex the number of its smooth vertex: same place and, where there is a crease, same normal."""
     place = np.unique(points, axis=0, return_inverse=True)[1].ravel()
     mean = _unit(np.stack([np.bincount(place, column) for column in _unit(normals).T], axis=1))
-    crease = np.einsum("ni,ni->n", _unit(normals), mean[place]) < _SMOOTH
+    crease = _dot(_unit(normals), mean[place]) < _SMOOTH
     creased = np.zeros(len(mean), dtype=bool)
     creased[place[crease]] = True
     side = np.where(creased[place, None], np.round(normals, 2), 0.0) + 0.0
@@ -69,33 +68,41 @@ def _smooth_groups(points: NDArray, normals: NDArray) -> NDArray[np.int64]:
 
 def _unit_normals(corners: NDArray) -> NDArray[np.float64]:
     """Return unit normals (m, 3) of triangles (m, 3 corners, 3); zero for one without area."""
-    a, b = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
-    normals = np.empty_like(a)                      # by hand: np.cross takes three times as long
+    return _unit(_cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]))
+
+
+def _cross(a: NDArray, b: NDArray) -> NDArray[np.float64]:
+    """Return the cross products of rows (m, 3): by hand, since np.cross takes three times as long."""
+    result = np.empty_like(a)
     for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
-        normals[:, i] = a[:, j] * b[:, k] - a[:, k] * b[:, j]
-    return _unit(normals)
+        result[:, i] = a[:, j] * b[:, k] - a[:, k] * b[:, j]
+    return result
+
+
+def _dot(a: NDArray, b: NDArray) -> NDArray[np.float64]:
+    return np.einsum("...i,...i->...", a, b)
 
 
 def _angles(corners: NDArray) -> NDArray[np.float64]:
     """Return the angle at each corner (m, 3), radians."""
     after = _unit(np.roll(corners, -1, axis=1) - corners)
     before = _unit(np.roll(corners, 1, axis=1) - corners)
-    return np.arccos(np.clip(np.einsum("mki,mki->mk", after, before), -1.0, 1.0))
+    return np.arccos(np.clip(_dot(after, before), -1.0, 1.0))
 
 
 def _unit(vectors: NDArray) -> NDArray[np.float64]:
-    length = np.sqrt(np.einsum("...i,...i->...", vectors, vectors))[..., None]
-    return np.divide(vectors, length, out=np.zeros_like(vectors, dtype=np.float64), where=length > _TINY)
+    """Return vectors of length 1; one that is too short to have a direction becomes zero."""
+    length = np.sqrt(_dot(vectors, vectors))
+    return vectors * np.where(length > _TINY, 1.0 / np.maximum(length, _TINY), 0.0)[..., None]
 
 
 def _turned(vectors: NDArray, before: NDArray, after: NDArray) -> NDArray[np.float64]:
     """Return vectors turned by the least rotation from ``before`` to ``after`` (Rodrigues); all (k, 3)."""
-    axis = np.cross(before, after)
-    cosine = np.einsum("ki,ki->k", before, after)
+    axis, cosine = _cross(before, after), _dot(before, after)
     opposite = 1.0 + cosine < _OPPOSITE
-    along = np.einsum("ki,ki->k", axis, vectors) / np.where(opposite, 1.0, 1.0 + cosine)
-    turned = vectors * cosine[:, None] + np.cross(axis, vectors) + axis * along[:, None]
-    turned = np.where(opposite[:, None], -vectors, turned)          # right over: every axis across is as good
-    known = (before != 0).any(axis=1) & (after != 0).any(axis=1)    # else the surface has no direction: leave it
-    return np.where(known[:, None], turned, vectors)
-
+    along = _dot(axis, vectors) / np.where(opposite, 1.0, 1.0 + cosine)
+    turned = vectors * cosine[:, None] + _cross(axis, vectors) + axis * along[:, None]
+    turned[opposite] = -vectors[opposite]           # right over: every axis across is as good
+    still = (_dot(before, before) == 0) | (_dot(after, after) == 0)
+    turned[still] = vectors[still]                  # the surface has no direction there: leave the file's
+    return turned

@@ -16,7 +16,7 @@ from facegen.errors import FileError
 from facegen.fileio.gltf_accessors import Accessors
 from facegen.fileio.gltf_colours import Colours, as_screen, mean_colour
 from facegen.fileio.gltf_file import GltfFile, compression_of, read_gltf, refuse_compressed
-from facegen.fileio.gltf_scene import Scene, joint_matrices, skinned
+from facegen.fileio.gltf_scene import FARTHEST, Scene, joint_matrices, skinned, within_reach
 from facegen.fileio.jsontree import Tree
 from facegen.geometry.mesh import Mesh
 
@@ -191,10 +191,9 @@ class _Reader:
         if matrix is None:
             matrix = self.scene.world[number]
         linear, offset = matrix[..., :3, :3], matrix[..., :3, 3]
-        with np.errstate(all="ignore"):             # what overflows is found right here
-            world = apply_linear(linear, points) + offset
-        if not np.isfinite(world).all():
-            raise self.scene.nodes[number].error("takes vertices to infinity")
+        world = apply_linear(linear, points) + offset
+        if not within_reach(world).all():
+            raise self.scene.nodes[number].error(f"takes vertices beyond {FARTHEST:g}")
         mesh = self.scene.nodes[number]["mesh"].integer()
         block = Block(number, part, mesh, accessor, which, self.count, self.count + count, linear)
         self.blocks.append(block)
@@ -212,10 +211,11 @@ class _Reader:
             self.triangle_count += len(faces)
             if self.triangle_count > _MOST_TRIANGLES:
                 raise primitive.error(f"more than {_MOST_TRIANGLES:,} triangles in all, which facegen does not read")
+            if primitive.items("targets"):
+                rows = np.unique(faces) if len(faces) else np.arange(count)
+                self.targets.append((block, primitive, target_names(mesh, primitive, part), rows))
             if not len(faces):
                 continue
-            if primitive.items("targets"):
-                self.targets.append((block, primitive, target_names(mesh, primitive, part), np.unique(faces)))
             if np.median(np.linalg.det(block.linear)) < 0:
                 faces = faces[:, ::-1]              # a mirrored node turns its triangles over (3.7.4)
             self.face_parts.append(self.parts.setdefault(part, len(self.parts)))
@@ -277,10 +277,9 @@ class _Reader:
 
     def _fill(self, shape: NDArray[np.float64], block: Block, reference: Tree, rows: NDArray[np.int64]) -> None:
         moved = self.accessors.floats(reference, "VEC3", count=block.stop - block.start)
-        with np.errstate(all="ignore"):             # what overflows is found right here
-            world = apply_linear(block.linear, moved.astype(np.float64))
-        if not np.isfinite(world).all():
-            raise reference.error("takes vertices to infinity")
+        world = apply_linear(block.linear, moved.astype(np.float64))
+        if not within_reach(world).all():
+            raise reference.error(f"takes vertices beyond {FARTHEST:g}")
         shape[block.start + rows] = world[rows]
 
 

@@ -15,6 +15,8 @@ from facegen.fileio.jsontree import Tree
 _MOST_NODES = 100_000
 # Because a quaternion shorter than this has no direction that its float32 numbers could tell.
 _NO_TURN = 1e-6
+# Because products of three such numbers, as in a determinant, stay far from what a double holds.
+FARTHEST = 1e30
 
 
 class Scene:
@@ -32,9 +34,9 @@ class Scene:
         roots = self._roots()
         with np.errstate(all="ignore"):             # what overflows is found below
             self.world = self._world(roots)
-        bad = np.flatnonzero(~np.isfinite(self.world).all(axis=(1, 2)))
+        bad = np.flatnonzero(~within_reach(self.world.reshape(-1, 16)))
         if len(bad):
-            raise self.nodes[bad[0]].error("its place in the world is not finite")
+            raise self.nodes[bad[0]].error(f"its transform goes beyond {FARTHEST:g}")
         self.shown = self._shown(tree, roots)
 
     def _roots(self) -> list[int]:
@@ -71,6 +73,11 @@ class Scene:
         for node in order:
             order += self._children[node]
         return sorted(set(order))
+
+
+def within_reach(rows: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Return for each row of numbers (n, k) whether all are finite and not absurd."""
+    return (np.abs(rows) <= FARTHEST).all(axis=1)
 
 
 def _local(node: Tree) -> NDArray[np.float64]:
@@ -114,6 +121,8 @@ def joint_matrices(tree: Tree, skin: Tree, world: NDArray[np.float64], accessors
             raise bind.error(f"{count} matrices for {len(joints)} joints")
         inverse = accessors.floats(bind, "MAT4")[:len(joints)].astype(np.float64)
         matrices = matrices @ inverse.reshape(-1, 4, 4).transpose(0, 2, 1)
+    if not within_reach(matrices.reshape(-1, 16)).all():
+        raise one.error(f"its joints go beyond {FARTHEST:g}")
     return matrices
 
 

@@ -24,8 +24,11 @@ def parse(text: bytes, path: Path, what: str = "JSON") -> dict[str, Any]:
     def refuse(word: str) -> float:
         raise ValueError(f"{word} is no JSON number")
 
+    def finite(word: str) -> float:
+        return float(word) if abs(float(word)) < math.inf else refuse(word[:20])
+
     try:
-        found = json.loads(text.decode("utf-8-sig"), parse_constant=refuse)
+        found = json.loads(text.decode("utf-8-sig"), parse_constant=refuse, parse_float=finite)
     except (ValueError, RecursionError) as error:
         why = "nested too deeply" if isinstance(error, RecursionError) else str(error)[:120]
         raise FileError(f"{path}: its {what} cannot be read: {why}") from None
