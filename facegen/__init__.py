@@ -19,7 +19,10 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from facegen.animation.clip import Clip
     from facegen.animation.script import load_clip, morph
+    from facegen.blendshapes.recipes import Recipe, shape_set
     from facegen.errors import FacegenError, FileError, InputError, JobError, NotationError, TableError
+    from facegen.face.avatar import AvatarFace
+    from facegen.face.convert import Conversion, convert
     from facegen.face.face import Controls, Face, face_names, load_face
     from facegen.facs.deformation import Deformation, load_deformation
     from facegen.facs.expression_table import people
@@ -36,8 +39,10 @@ if TYPE_CHECKING:
 __version__ = "0.1.0"
 
 __all__ = [
+    "AvatarFace",
     "Clip",
     "Controls",
+    "Conversion",
     "Deformation",
     "Face",
     "FacegenError",
@@ -46,12 +51,14 @@ __all__ = [
     "JobError",
     "Mesh",
     "NotationError",
+    "Recipe",
     "Renderer",
     "Resolution",
     "TableError",
     "Wireframe",
     "canonical",
     "contact_sheet",
+    "convert",
     "face_names",
     "load_clip",
     "load_deformation",
@@ -72,13 +79,17 @@ __all__ = [
     "save_passes",
     "save_turn",
     "save_video",
+    "shape_set",
 ]
 
 # Where each name lives. Read on first use (PEP 562), so that `import facegen` costs nothing.
 _HOMES = {
     "facegen.animation.clip": ("Clip",),
     "facegen.animation.script": ("load_clip", "morph"),
+    "facegen.blendshapes.recipes": ("Recipe", "shape_set"),
     "facegen.errors": ("FacegenError", "FileError", "InputError", "JobError", "NotationError", "TableError"),
+    "facegen.face.avatar": ("AvatarFace",),
+    "facegen.face.convert": ("Conversion", "convert"),
     "facegen.face.face": ("Controls", "Face", "face_names", "load_face"),
     "facegen.facs.deformation": ("Deformation", "load_deformation"),
     "facegen.facs.expression_table": ("people",),

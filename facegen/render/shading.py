@@ -41,7 +41,7 @@ class Surface:
     normals: (n or m, 3) float32 in camera axes, a vertex's or (flat) a triangle's. light: (n, 1 + lights)
     float32, the ambient openness and each light's share. planes: (m, 3, 3) float32 weights of the corners
     as functions of pixel offsets from ``origin`` (m, 2). back: (m,) seen from inside. material: (m,) row of
-    the tables.
+    the tables. colours: (n, 3) float32 linear albedo of the vertices, or None.
     """
 
     faces: NDArray[np.int32]
@@ -55,6 +55,7 @@ class Surface:
     albedo: NDArray[np.float32]
     wrap: NDArray[np.float32]
     gloss: NDArray[np.float32]
+    colours: NDArray[np.float32] | None = None
 
 
 def surface(mesh: Mesh, camera: Camera, scene: Scene, *, flat: bool = False, light: NDArray[np.float32] | None = None,
@@ -74,7 +75,7 @@ def surface(mesh: Mesh, camera: Camera, scene: Scene, *, flat: bool = False, lig
     material = np.where(back, len(mesh.materials), mesh.face_materials).astype(np.int32)
     rows = material_rows(mesh, scene)
     return Surface(mesh.faces, (normals @ camera.rotation.T).astype(np.float32), flat, light, planes, origin, back,
-                   material, rows[:, :3], rows[:, 3:6], rows[:, 6:])
+                   material, rows[:, :3], rows[:, 3:6], rows[:, 6:], vertex_albedo(mesh))
 
 
 def baked_light(mesh: Mesh, normals: NDArray, camera: Camera, scene: Scene) -> NDArray[np.float32]:
@@ -90,6 +91,14 @@ def material_rows(mesh: Mesh, scene: Scene) -> NDArray[np.float32]:
     looks: list[Material] = [scene.materials.get(name, CLAY) for name in mesh.materials] + [INSIDE]
     return np.array([(*from_srgb(look.albedo), *look.wrap, look.specular, look.shininess, look.catch, look.lift)
                      for look in looks], np.float32)
+
+
+def vertex_albedo(mesh: Mesh) -> NDArray[np.float32] | None:
+    """Return the linear albedo (n, 3) of a mesh's vertices, or None if it leaves that to the materials."""
+    if mesh.colours is None:
+        return None
+    v = mesh.colours / np.float32(255)
+    return np.where(v <= 0.04045, v / 12.92, ((v + 0.055) / 1.055) ** 2.4).astype(np.float32)
 
 
 def light_directions(scene: Scene) -> NDArray[np.float64]:
@@ -115,6 +124,8 @@ def shade(surface: Surface, camera: Camera, scene: Scene, ids: NDArray, x: NDArr
     lifted = np.flatnonzero(lift)
     light[:, lifted] **= 1 - lift[lifted]
     inside = s.back[ids]
+    if s.colours is not None:
+        albedo = np.where(inside, albedo, sum(b[k, :, None] * s.colours[corners[:, k]] for k in range(3)).T)
 
     # Ambient: sky above, ground below; light that bounces in a cavity returns coloured: E = a / (1 - c (1 -
     # a)).
