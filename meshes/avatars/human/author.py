@@ -3,105 +3,120 @@
     python meshes/avatars/human/author.py [FOLDER]
 
 The head is a cage of quads in rows and loops (head_cage, eyes, mouth, ears) laid over the general shape of facegen's
-own base face, aged (age), subdivided once by Catmull and Clark's rules (quads), wrinkled and dressed (parts).
+own base face, aged (age), subdivided once by Catmull and Clark's rules (quads), furrowed and dressed (parts). The
+file is in centimetres, +y up, +z forward, with the origin in the middle of the neck's opening; the head is turned a
+little, as heads are.
 """
 
 from __future__ import annotations
+
+import sys
+from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 from age import furrow, push_clay
 from ears import EARS, add_ear, relief
 from eyes import EYES, add_lids, eyeball, press_on_ball
 from head_cage import BaseShape, head_cage
-from mouth import CONTACT, add_lips, add_nostrils, close_lips
-from quads import catmull_clark, vertex_normals
+from mouth import CONTACT, add_lips, add_nostrils, close_lips, facing_pairs
+from numpy.typing import NDArray
+from parts import Part, brow, fringe, lining, teeth, tongue
+from quads import Cage, catmull_clark, vertex_normals
 
-from facegen.geometry.mesh import Mesh, merge
-
-
-def refined(loops, cage, edge_index, n):
-    """Return the fine vertices on a closed loop of keys: its vertices and the points of its edges, in order."""
-    i = [cage.index[k] for k in loops]
-    out = []
-    for a, b in zip(i, i[1:] + i[:1], strict=True):
-        out += [a, n + edge_index[min(a, b), max(a, b)]]
-    return np.array(out)
+SEED = 1986
+BORDER, BALL_EDGE, POCKET = 3, 5, 6          # rings: the lips' border; the lids' inner edge and their pocket
 
 
-def skin():
-    base = BaseShape()
-    cage = head_cage()
-    lips = add_lips(cage, base.project)
-    nostrils = add_nostrils(cage)
-    reliefs = []
-    for ear in EARS:
-        reliefs.append(add_ear(cage, ear))
+@dataclass
+class Skin:
+    """The subdivided skin, and which fine vertices come from which loops of the cage."""
+
+    cage: Cage
+    lips: list[list]
+    lids: list[list[list]]
+    ears: list[tuple[list, list]]
+    nostrils: list
+    places: NDArray
+    quads: NDArray
+
+    def __post_init__(self) -> None:
+        self.n = len(self.cage.place)
+        self.coarse = np.array(self.cage.quads)
+        self.edge = {tuple(e): i for i, e in enumerate(self.edges.tolist())}
+
+    edges: NDArray = None
+
+    def loop(self, keys: list) -> NDArray:
+        """Return the fine vertices on a closed loop of keys: its vertices and the points of its edges, in order."""
+        i = [self.cage.index[k] for k in keys]
+        return np.array([j for a, b in zip(i, i[1:] + i[:1], strict=True)
+                         for j in (a, self.n + self.edge[min(a, b), max(a, b)])])
+
+    def spread(self, keys, *, whole: bool = False) -> NDArray:
+        """Return a weight (fine vertices,), 1 at the keys; ``whole``: only where all around are keys."""
+        w = np.zeros(self.n)
+        w[[self.cage.index[k] for k in keys]] = 1.0
+        mean = np.minimum.reduce if whole else np.mean
+        return np.concatenate([w, mean(w[self.edges], axis=1), mean(w[self.coarse], axis=1)])
+
+
+def make_skin() -> Skin:
+    """Return the aged skin, subdivided, with relief, furrows and lids on the eyeballs."""
+    base, cage = BaseShape(), head_cage()
+    lips, nostrils = add_lips(cage, base.project), add_nostrils(cage)
+    ears = [add_ear(cage, ear) for ear in EARS]
     cage.place = list(push_clay(np.array(cage.place)))
     lids = [add_lids(cage, eye) for eye in EYES]
     places, quads, edges = catmull_clark(np.array(cage.place), np.array(cage.quads))
-    n = len(cage.place)
-    edge_index = {tuple(e): i for i, e in enumerate(edges.tolist())}
-    # ears
-    source = np.concatenate([cage.quads])
-    return cage, lips, lids, reliefs, nostrils, places, quads, edge_index, n
-
-
-def build():
-    cage, lips, lids, reliefs, nostrils, places, quads, edge_index, n = skin()
-    is_ear = np.zeros(len(places), bool)
-    quads_cage = np.array(cage.quads)
-    for ear, (front, every) in zip(EARS, reliefs, strict=True):
-        on = np.zeros(n, bool)
-        on[[cage.index[k] for k in front]] = True
-        fine = on_fine(on, edge_index, quads_cage, n)
-        local = ear.local(places[fine])
-        local[:, 2] = relief(local[:, 0], local[:, 1])
-        places[fine] = ear.place(*local.T)
+    skin = Skin(cage, lips, lids, ears, nostrils, places, quads, edges)
+    for ear, (front, _) in zip(EARS, ears, strict=True):
+        rows = skin.spread(front, whole=True) == 1.0
+        local = ear.local(places[rows])
+        places[rows] = ear.place(local[:, 0], local[:, 1], relief(local[:, 0], local[:, 1]))
     for k in CONTACT:
-        loop = refined(lips[k], cage, edge_index, n)
-        pair(places, loop)
+        close_lips(places, *facing_pairs(skin.loop(lips[k])))
+    smooth = [k for ring in lips[BORDER:] for k in ring]
+    smooth += [k for rings in lids for ring in rings[3:] for k in ring]
+    smooth += [k for _, every in ears for k in every] + nostrils
     normals = vertex_normals(places, quads)
-    places = places + normals * (furrow(places, normals) * outside(cage, lips, lids, reliefs, edge_index, n, len(places)))[:, None]
+    skin.places = places + normals * (furrow(places, normals) * (1.0 - skin.spread(smooth)))[:, None]
     for eye, rings in zip(EYES, lids, strict=True):
-        press_on_ball(places, eye, refined(rings[5], cage, edge_index, n), refined(rings[6], cage, edge_index, n))
-    q = quads
-    tri = np.concatenate([q[:, [0, 1, 2]], q[:, [0, 2, 3]]])
-    meshes = [Mesh.of(places, tri)]
+        press_on_ball(skin.places, eye, skin.loop(rings[BALL_EDGE]), skin.loop(rings[POCKET]))
+    return skin
+
+
+def skin_part(skin: Skin) -> Part:
+    """Return the skin with its materials: lips, nostrils, the inner side of the lips."""
+    lip = skin.spread([k for ring in skin.lips[BORDER:7] for k in ring], whole=True) == 1
+    inside = skin.spread([k for ring in skin.lips[6:] for k in ring], whole=True) == 1
+    nostril = skin.spread(skin.nostrils, whole=True) == 1
+    part = Part("skin")
+    names = []
+    for q in skin.quads:
+        names.append("nostril" if nostril[q].all() else "mouth" if inside[q].all() else "lips" if lip[q].all() else "skin")
+    part.add(skin.places, [tuple(q) for q in skin.quads.tolist()], names)
+    return part
+
+
+def author() -> tuple[list[Part], Skin]:
+    """Return all parts, millimetres, in the frame of the base face."""
+    rng = np.random.default_rng(SEED)
+    skin = make_skin()
+    normals = vertex_normals(skin.places, skin.quads)
+    parts = [skin_part(skin)]
     for eye in EYES:
-        v, f, mats = eyeball(eye)
-        t, tm = [], []
-        names = tuple(dict.fromkeys(mats))
-        for face, m in zip(f, mats):
-            for i in range(1, len(face) - 1):
-                t.append((face[0], face[i], face[i + 1])); tm.append(names.index(m))
-        p = "eye_L" if eye.sign > 0 else "eye_R"
-        meshes.append(Mesh(v, t, names, tm, (p,), [0] * len(t)))
-    return merge(meshes)
+        part = Part("eye_L" if eye.sign > 0 else "eye_R")
+        part.add(*eyeball(eye))
+        parts.append(part)
+    parts += [teeth("teeth_upper"), teeth("teeth_lower"), tongue(), lining()]
+    parts += [brow(sign, skin.places, normals, rng) for sign in (1, -1)]
+    bare = skin.spread([k for _, every in skin.ears for k in every]) == 0
+    parts.append(fringe(skin.places[bare], rng))
+    return parts, skin
 
 
-def on_fine(on, edge_index, quads, n):
-    edges = np.array(list(edge_index))
-    return np.concatenate([on, on[edges].all(axis=1), on[quads].all(axis=1)])
+if __name__ == "__main__":
+    from write import write
 
-
-def outside(cage, lips, lids, reliefs, edge_index, n, total):
-    """1 on plain skin, 0 on lips, lids' edges and ears."""
-    w = np.ones(n)
-    for rings in [lips[3:]] + [r[3:] for r in lids]:
-        for ring in rings:
-            w[[cage.index[k] for k in ring]] = 0
-    for _, every in reliefs:
-        w[[cage.index[k] for k in every]] = 0
-    edges = np.array(list(edge_index))
-    return np.concatenate([w, w[edges].mean(axis=1), w[np.array(cage.quads)].mean(axis=1)])
-
-
-def pair(places, loop):
-    """Close a contact loop: it starts at the lower right; vertices with equal q pair up."""
-    m = len(loop)
-    # spokes start at column -6, row 7: corner right is 2 spokes before the start
-    right = (m - 4) % m
-    left = (right + m // 2) % m
-    lower = [(right + k) % m for k in range(1, m // 2)]
-    upper = [(right - k) % m for k in range(1, m // 2)]
-    close_lips(places, loop[upper], loop[lower])
+    write(*author(), Path(sys.argv[1]) if len(sys.argv) > 1 else Path(__file__).parent)

@@ -15,7 +15,7 @@ from quads import Cage
 from facegen.face.eye import eyeball_radius
 
 BALL = 14.0                 # radius of the white
-IRIS = 5.7                  # half the width of the iris
+IRIS = 5.5                  # half the width of the iris
 GAP = 0.13                  # from the ball to the lid's inner edge: a film of tears, and room for flat facets
 THICKNESS = 1.7             # of a lid at its margin
 RINGS = 7                   # the orbit's rim, fold, crease, lid, outer edge, inner edge, pocket behind the ball's front
@@ -42,12 +42,12 @@ class Eye:
         return np.array([self.sign * np.sin(a) * np.cos(e), np.sin(e), np.cos(a) * np.cos(e)])
 
 
-AZIMUTH = (-51, -44, -35, -25, -14, -2, 11, 24, 36, 47, 56)
+AZIMUTH = (-54, -46, -37, -26, -15, -2, 11, 24, 37, 49, 59)
 EYES = (
     Eye(1, (29.6, -.6, -.6), AZIMUTH, (-11, -1, 6.5, 11.5, 14.5, 15.5, 15, 12.5, 8, 1.5, -6),
-        (-11, -15, -18, -19.5, -20.5, -21, -21, -20, -17.5, -13, -6), hood=2.0, bag=2.4),
+        (-11, -15, -18, -19.5, -20.5, -21, -21, -20, -17.5, -13, -6), hood=2.8, bag=2.4),
     Eye(-1, (-29.6, -1.0, -.6), AZIMUTH, (-11, -2.5, 3.5, 7.5, 10, 11, 10, 7, 2.5, -3, -9),
-        (-11, -15, -17.5, -19, -19.5, -19.5, -19, -18, -16, -13, -9), hood=2.7, bag=1.9),
+        (-11, -15, -17.5, -19, -19.5, -19.5, -19, -18, -16, -13, -9), hood=3.4, bag=1.9),
 )
 
 
@@ -112,8 +112,8 @@ def _section(eye: Eye, orbit: NDArray, i: int, lid: int) -> list[NDArray]:
 
     if lid > 0:
         hang = eye.hood * (0.35 + 0.65 * t)             # an old lid hangs lower outside
-        fold = at(0.60 - 0.045 * hang * middle, skin(0.60) + 0.9 * hang * middle)
-        crease = at(0.42, ball + 2.4 + 0.6 * (1 - middle))
+        fold = at(0.60 - 0.055 * hang * middle, skin(0.60) + 0.75 * hang * middle)
+        crease = at(0.44, ball + 1.9 + 1.0 * (1 - middle))
         pretarsal = at(0.20, ball + 2.25)
     elif lid < 0:
         fold = at(0.70, skin(0.70) + eye.bag * middle)

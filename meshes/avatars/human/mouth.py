@@ -14,8 +14,8 @@ RINGS = 8            # hole, around, near, border, belly, contact in front, cont
 CONTACT = (5, 6)
 SLIT = 0.16          # between the lips: they touch for the eye, but are not welded
 
-SEAM = np.array([(0, -70.3, 31.6), (4, -70.1, 31.4), (8, -70.0, 30.6), (12, -70.2, 29.1), (16, -70.7, 27.0),
-                 (19.6, -71.3, 24.7), (22.6, -71.9, 22.4), (24.7, -72.5, 20.6), (26.2, -73.0, 19.2)])
+SEAM = np.array([(0, -70.3, 31.6), (4, -70.1, 31.4), (8, -70.0, 30.6), (12, -70.2, 29.1), (16, -70.5, 27.0),
+                 (19.6, -70.9, 24.7), (22.6, -71.2, 22.4), (24.7, -71.5, 20.6), (26.2, -71.8, 19.2)])
 # above and in front of the seam
 UPPER_BORDER = np.array([(4.6, .7), (5.6, .9), (5.0, .9), (4.2, .8), (3.4, .7), (2.5, .6), (1.7, .5), (.9, .5), (0, .7)])
 UPPER_BELLY = np.array([(2.2, 1.5), (2.6, 1.6), (2.3, 1.6), (1.9, 1.5), (1.5, 1.3), (1.1, 1.1), (.8, .8), (.45, .5), (0, .2)])
@@ -104,3 +104,11 @@ def add_nostrils(cage: Cage) -> list:
         cage.quad(a[0], a[1], a[4], a[5])
         cage.quad(a[1], a[2], a[3], a[4])
     return inner
+
+
+def facing_pairs(loop: NDArray) -> tuple[NDArray, NDArray]:
+    """Return (upper, lower) vertices of a fine lip loop that lie over each other, without the corners."""
+    m = len(loop)
+    right = (m - 2 * 2) % m                             # the loop starts two spokes after the right corner
+    k = np.arange(1, m // 2)
+    return loop[(right - k) % m], loop[(right + k) % m]
