@@ -18,7 +18,7 @@ CLAY = [  # what, centre, radii, move, left, right
     ("cheek bone shows", (49, -21, 4), (13, 9, 16), (2.2, .6, 1.2), 1, 1),
     ("cheek is hollow", (47, -50, -4), (14, 19, 22), (-6.2, 0, -2.8), 1, .85),
     ("cheek beside the mouth falls in", (40, -66, 4), (9, 14, 14), (-2.2, 0, -1.6), 1, 1),
-    ("cheek pad sags", (30, -44, 16), (9, 10, 12), (.4, -1.6, 1.8), 1, 1.15),
+    ("cheek pad sags", (33, -45, 16), (8, 12, 12), (.4, -1.4, 3.2), 1, 1.15),
     ("jowl", (36, -91, 2), (11, 9, 16), (2.0, -4.2, 2.2), 1.1, .9),
     ("notch before the jowl", (23, -99, 12), (7, 8, 12), (-.4, 1.6, -1.4), 1, 1),
     ("chin", (0, -98, 22), (15, 10, 16), (0, .4, 3.2), 1, 1),
@@ -43,14 +43,9 @@ CLAY = [  # what, centre, radii, move, left, right
 ]
 
 FURROWS = [  # what, points (x, y) seen from the front, half width, depth, left, right
-    ("forehead 1", [(0, 33.5), (9, 33), (20, 35.5), (32, 37), (43, 34)], 1.9, 1.9, 1, .9),
-    ("forehead 2", [(0, 43.5), (12, 43), (24, 46), (36, 47), (45, 44)], 2.0, 2.1, 1, 1),
-    ("forehead 3", [(0, 55), (13, 54), (25, 56.5), (37, 56)], 2.1, 1.7, 1, .8),
     ("frown", [(5.0, 9), (5.6, 15), (4.6, 22)], 1.7, 1.7, 1.1, .8),
     ("nasion", [(0, 4), (5, 4.6), (9, 6)], 1.9, .9, 1, 1),
     ("wing's groove", [(14, -27.5), (19, -29.5), (23, -35), (24, -42), (21.5, -47.5)], 1.7, 1.7, 1, 1),
-    ("nasolabial", [(20, -30), (25.5, -38), (30, -48), (33.8, -59), (36, -71)], 2.4, 3.0, 1, 1.15),
-    ("marionette", [(29.5, -76.5), (31.0, -83), (31.5, -91), (30, -98)], 2.1, 1.7, .9, 1.2),
     ("chin fold", [(0, -86.5), (8, -86.2), (15, -87.6), (21, -90)], 2.6, 1.5, 1, 1),
     ("tear trough", [(15.5, -12.5), (20, -18.5), (27, -22.5), (35, -23.5), (43, -20.5)], 2.2, 1.3, 1.1, .9),
     ("lower bag", [(19, -10.8), (27, -13.8), (36, -13), (43, -9.8)], 1.5, .6, 1, .9),
@@ -61,6 +56,12 @@ FURROWS = [  # what, points (x, y) seen from the front, half width, depth, left,
     ("upper lip", [(9, -55), (9.6, -62)], 1.2, .35, 1, 1),
     ("philtrum", [(0, -53.5), (0, -63.5)], 2.0, .9, 1, 1),
     ("neck", [(0, -119), (14, -116), (28, -112), (40, -106)], 2.2, 1.2, 1, 1),
+]
+FOLDS = [  # the same along vertices of the cage, which puts an edge loop into the fold: what, (row, column)s, ...
+    ("lower line of the forehead", [(24, c) for c in range(-7, 8)], 2.1, 1.9, 1, 1),
+    ("upper line of the forehead", [(27, c) for c in range(-8, 7)], 2.1, 1.7, 1, 1),
+    ("nasolabial", [(14, 5), (13, 6), (12, 6), (11, 6), (10, 6), (9, 6)], 2.8, 3.6, 1, 1.15),
+    ("marionette", [(8, 6), (7, 6), (6, 6), (5, 5)], 2.6, 2.4, .9, 1.2),
 ]
 FLANK = 0.45         # the skin that a furrow displaces swells beside it, as a part of its depth
 
@@ -77,31 +78,47 @@ def push_clay(places: NDArray) -> NDArray:
     return out
 
 
-def furrow(places: NDArray, normals: NDArray) -> NDArray:
-    """Return how far each place (n, 3) moves along its normal (n,)."""
+def furrow(places: NDArray, normals: NDArray, at) -> NDArray:
+    """Return how far each place (n, 3) moves along its normal (n,).
+
+    at: gives the index of the vertex at a (row, column) of the cage's grid.
+    """
     move = np.zeros(len(places))
     facing = np.flatnonzero((normals[:, 2] > 0.05) & (places[:, 2] > -50))
     seen = cKDTree(places[facing, :2])
     for _, points, width, depth, left, right in FURROWS:
+        crosses = points[0][0] == 0                    # its mirror image continues it across the middle
         for sign, strength in ((1, left), (-1, right)):
-            line, taper = _line(np.array(points, dtype=np.float64) * [sign, 1], crosses_middle=points[0][0] == 0)
+            line, taper = _line(np.array(points, dtype=np.float64) * [sign, 1], fades_in=not crosses)
             z = places[facing[seen.query(line, k=3)[1]], 2].max(axis=1)
-            away, at = cKDTree(np.column_stack([line, z])).query(places, distance_upper_bound=4 * width)
-            hit = np.flatnonzero(np.isfinite(away))
-            x2 = (away[hit] / width) ** 2
-            groove = -(np.exp(-x2) - FLANK * x2 * np.exp(-x2 / 1.6) / 1.6)
-            half = 0.5 if points[0][0] == 0 and abs(points[-1][0]) < 1e-9 else 1.0
-            part = strength * half * depth * taper[at[hit]] * groove
-            if points[0][0] == 0 and half == 1.0:      # each side draws its own half of a line across the middle
-                part *= np.where(sign * places[hit, 0] > 0, 1.0, np.where(places[hit, 0] == 0, 0.5, 0.0))
-            move[hit] += part
+            cut = _groove(places, np.column_stack([line, z]), taper, width) * strength * depth
+            if crosses:
+                side = sign * places[:, 0]
+                cut *= np.where(side > 1e-6, 1.0, np.where(side < -1e-6, 0.0, 0.5))
+            move += cut
+    for _, cells, width, depth, left, right in FOLDS:
+        both = ((1, left), (-1, right)) if min(c for _, c in cells) > 0 else ((1, 1.0),)
+        for sign, strength in both:
+            path = places[[at(r, sign * c) for r, c in cells]]
+            line, taper = _line(path, fades_in=True)
+            move += _groove(places, line, taper, width) * strength * depth
     return move
 
 
-def _line(points: NDArray, *, crosses_middle: bool) -> tuple[NDArray, NDArray]:
-    """Return 80 points along a smooth curve and how deep it is there, 0..1, fading at its free ends."""
+def _groove(places: NDArray, line: NDArray, taper: NDArray, width: float) -> NDArray:
+    """Return a furrow's profile at all places: -1 on the line, a swelling beside it, times ``taper`` of the line."""
+    away, nearest = cKDTree(line).query(places, distance_upper_bound=4 * width)
+    hit = np.flatnonzero(np.isfinite(away))
+    x2 = (away[hit] / width) ** 2
+    out = np.zeros(len(places))
+    out[hit] = (FLANK * x2 * np.exp(-x2 / 1.6) / 1.6 - np.exp(-x2)) * taper[nearest[hit]]
+    return out
+
+
+def _line(points: NDArray, *, fades_in: bool) -> tuple[NDArray, NDArray]:
+    """Return 80 points along a smooth curve and how deep it is there, 0..1, fading at its end (and start)."""
     t = np.concatenate([[0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
     s = np.linspace(0, 1, 80)
     line = CubicSpline(t, points)(s * t[-1])
-    taper = np.sin(np.pi * (0.5 + s / 2 if crosses_middle else s)) ** 0.6
+    taper = np.sin(np.pi * (s if fades_in else 0.5 + s / 2)) ** 0.6
     return line, np.maximum(taper, 0.0)

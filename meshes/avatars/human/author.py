@@ -18,7 +18,7 @@ import numpy as np
 from age import furrow, push_clay
 from ears import EARS, add_ear, relief
 from eyes import EYES, add_lids, eyeball, press_on_ball
-from head_cage import BaseShape, head_cage
+from head_cage import BaseShape, head_cage, key
 from mouth import CONTACT, add_lips, add_nostrils, close_lips, facing_pairs
 from numpy.typing import NDArray
 from parts import Part, brow, fringe, lining, teeth, tongue
@@ -39,13 +39,12 @@ class Skin:
     nostrils: list
     places: NDArray
     quads: NDArray
+    edges: NDArray                           # of the cage
 
     def __post_init__(self) -> None:
         self.n = len(self.cage.place)
         self.coarse = np.array(self.cage.quads)
         self.edge = {tuple(e): i for i, e in enumerate(self.edges.tolist())}
-
-    edges: NDArray = None
 
     def loop(self, keys: list) -> NDArray:
         """Return the fine vertices on a closed loop of keys: its vertices and the points of its edges, in order."""
@@ -80,7 +79,8 @@ def make_skin() -> Skin:
     smooth += [k for rings in lids for ring in rings[3:] for k in ring]
     smooth += [k for _, every in ears for k in every] + nostrils
     normals = vertex_normals(places, quads)
-    skin.places = places + normals * (furrow(places, normals) * (1.0 - skin.spread(smooth)))[:, None]
+    depth = furrow(places, normals, lambda r, c: cage.index[key(r, c)]) * (1.0 - skin.spread(smooth))
+    skin.places = places + normals * depth[:, None]
     for eye, rings in zip(EYES, lids, strict=True):
         press_on_ball(skin.places, eye, skin.loop(rings[BALL_EDGE]), skin.loop(rings[POCKET]))
     return skin

@@ -149,7 +149,7 @@ BROWS = {  # the middle of the hair, from inside outward: x, y seen from the fro
     1: [(8.5, 13.4), (15, 15.8), (24, 18.2), (33, 19.4), (42, 17.4), (50, 11.6)],
     -1: [(-8.0, 12.6), (-15, 14.2), (-24, 15.4), (-33, 15.6), (-42, 12.8), (-50, 6.6)]}
 BROW_HALF = (2.0, 3.4, 3.8, 3.5, 2.6, 0.9)
-TUFTS = 30
+TUFTS = 44
 
 
 def brow(sign: int, skin: NDArray, normals: NDArray, rng) -> Part:
@@ -176,7 +176,7 @@ def brow(sign: int, skin: NDArray, normals: NDArray, rng) -> Part:
     xy = line(along)[:, None] + (half(along)[:, None] * across * ragged)[..., None] * upward[:, None]
     place, normal = lift(xy)
     end = np.sin(np.pi * np.linspace(0.04, 0.97, 17)) ** .4
-    height = 0.25 + 1.25 * (1 - across**2)[None, :] * end[:, None]
+    height = 0.25 + 0.9 * (1 - across**2)[None, :] * end[:, None]
     mat = place + height[..., None] * normal
     faces = []
     for a in range(16):
@@ -187,15 +187,15 @@ def brow(sign: int, skin: NDArray, normals: NDArray, rng) -> Part:
     part.add(mat.reshape(-1, 3), faces, "white hair")
     for i in range(TUFTS):
         s = t[-1] * (i + .5) / TUFTS
-        side = ((i * 0.618) % 1.0 - .5) * 1.3
+        side = ((i * 0.618) % 1.0 - .55) * 1.7
         tan = line(s, 1) / np.linalg.norm(line(s, 1))
         up = np.array([-tan[1], tan[0]]) * sign
         root, n = lift(line(s) + side * half(s) * up)
         fan = 1 - s / t[-1]                              # inner hairs stand up, outer ones lie along the brow
-        out = np.append(tan, 0) * (.55 + .9 * (1 - fan)) + np.append(up, 0) * (.75 * fan + .1 - .55 * side) + .55 * n
+        out = np.append(tan, 0) * (.55 + .9 * (1 - fan)) + np.append(up, 0) * (.7 * fan + .05 - .5 * side) + .75 * n
         out += .18 * rng.standard_normal(3)
         out /= np.linalg.norm(out)
-        part.add(*_tuft(root + .4 * n, out, n, length=4.6 + 2.4 * rng.random(), width=.85), "white hair")
+        part.add(*_tuft(root + .3 * n, out, n, length=4.8 + 2.6 * rng.random(), width=.8), "white hair")
     return part
 
 
@@ -222,7 +222,7 @@ def _tuft(root, out, normal, *, length: float, width: float) -> tuple[NDArray, l
 # ---- the fringe of hair ----
 
 FRINGE = [  # degrees from the face to the back, lowest and highest elevation as seen from VIEW_CENTRE
-    (66, 30, 36), (72, 16, 43), (77, 6, 47), (82, 14, 49), (88, 29, 50), (95, 32, 50), (102, 28, 49), (109, 8, 48),
+    (66, 30, 36), (72, 16, 43), (77, 6, 47), (82, 14, 49), (88, 25, 50), (95, 26, 50), (102, 22, 49), (109, 6, 48),
     (118, -16, 46), (132, -30, 43), (150, -35, 40), (180, -37, 37)]
 FRINGE_AROUND, FRINGE_UP = 58, 9
 HAIR_THICKNESS = 4.2
