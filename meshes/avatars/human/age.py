@@ -18,9 +18,9 @@ CLAY = [  # what, centre, radii, move, left, right
     ("cheek bone shows", (49, -21, 4), (13, 9, 16), (2.2, .6, 1.2), 1, 1),
     ("cheek is hollow", (47, -50, -4), (14, 19, 22), (-6.2, 0, -2.8), 1, .85),
     ("cheek beside the mouth falls in", (40, -66, 4), (9, 14, 14), (-2.2, 0, -1.6), 1, 1),
-    ("cheek pad sags", (33, -45, 16), (8, 12, 12), (.4, -1.4, 3.2), 1, 1.15),
-    ("jowl", (36, -91, 2), (11, 9, 16), (2.0, -4.2, 2.2), 1.1, .9),
-    ("notch before the jowl", (23, -99, 12), (7, 8, 12), (-.4, 1.6, -1.4), 1, 1),
+    ("cheek pad sags", (33, -45, 16), (8, 12, 12), (.6, -1.4, 4.2), 1, 1.15),
+    ("jowl", (37, -90, 2), (10, 9, 16), (3.0, -5.2, 3.2), 1.1, .9),
+    ("notch before the jowl", (23, -99, 12), (7, 8, 12), (-.8, 2.4, -2.2), 1, 1),
     ("chin", (0, -98, 22), (15, 10, 16), (0, .4, 3.2), 1, 1),
     ("chin tip", (0, -103, 16), (13, 7, 14), (0, -1.6, 1.4), 1, 1),
     ("jaw corner", (54, -74, -44), (12, 14, 20), (1.6, 0, 0), 1, 1),
@@ -45,7 +45,7 @@ CLAY = [  # what, centre, radii, move, left, right
 FURROWS = [  # what, points (x, y) seen from the front, half width, depth, left, right
     ("frown", [(5.0, 9), (5.6, 15), (4.6, 22)], 1.7, 1.7, 1.1, .8),
     ("nasion", [(0, 4), (5, 4.6), (9, 6)], 1.9, .9, 1, 1),
-    ("wing's groove", [(14, -27.5), (19, -29.5), (23, -35), (24, -42), (21.5, -47.5)], 1.7, 1.7, 1, 1),
+    ("marionette", [(28.5, -75.5), (30.4, -81), (31, -88), (30, -96)], 2.6, 3.0, .8, 1.2),
     ("chin fold", [(0, -86.5), (8, -86.2), (15, -87.6), (21, -90)], 2.6, 1.5, 1, 1),
     ("tear trough", [(15.5, -12.5), (20, -18.5), (27, -22.5), (35, -23.5), (43, -20.5)], 2.2, 1.3, 1.1, .9),
     ("lower bag", [(19, -10.8), (27, -13.8), (36, -13), (43, -9.8)], 1.5, .6, 1, .9),
@@ -60,8 +60,8 @@ FURROWS = [  # what, points (x, y) seen from the front, half width, depth, left,
 FOLDS = [  # the same along vertices of the cage, which puts an edge loop into the fold: what, (row, column)s, ...
     ("lower line of the forehead", [(24, c) for c in range(-7, 8)], 2.1, 1.9, 1, 1),
     ("upper line of the forehead", [(27, c) for c in range(-8, 7)], 2.1, 1.7, 1, 1),
-    ("nasolabial", [(14, 5), (13, 6), (12, 6), (11, 6), (10, 6), (9, 6)], 2.8, 3.6, 1, 1.15),
-    ("marionette", [(8, 6), (7, 6), (6, 6), (5, 5)], 2.6, 2.4, .9, 1.2),
+    ("nasolabial", [(15, 6), (14, 6), (13, 6), (12, 6), (11, 6), (10, 6), (9, 6), (8, 6)], 2.8, 3.9, 1, 1.2),
+    ("wing's groove", [(15, 4), (14, 5), (13, 5), (12, 5), (11, 5)], 1.6, 1.8, 1, 1),
 ]
 FLANK = 0.45         # the skin that a furrow displaces swells beside it, as a part of its depth
 

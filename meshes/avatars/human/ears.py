@@ -17,7 +17,7 @@ from scipy.interpolate import CubicSpline
 OUTLINE = np.array([(-9.5, -22), (-8.5, -30), (-4, -37.5), (3, -38.5), (9, -34), (13.5, -26), (17.5, -16.5), (22, -6.5),
                     (26, 3.5), (28, 14), (26.5, 24), (21, 31.5), (12.5, 35), (4, 34), (-3.5, 29.5), (-8.5, 22.5),
                     (-10.5, 13.5), (-11, 4), (-10.8, -5), (-10.3, -14)])
-FRONT = np.array([1, .8, .35, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, .1, .5, .9, 1, 1, 1])    # 1 where it grows out of the cheek
+FRONT = np.array([1, .8, .35, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, .1, .45, .85, 1, 1, 1, 1])    # 1 where it grows out of the cheek
 INWARD = (0.93, 0.83, 0.68, 0.52, 0.36)                 # the loops inside the rim, as parts of the outline
 CENTRE = np.array([2.0, -1.0])
 
@@ -49,7 +49,7 @@ class Ear:
         return (places - np.array(self.origin) * [self.sign, 1, 1]) @ self.axes().T / self.size
 
 
-EARS = (Ear(1, (71.0, -20, -66.5), 29, 9, 1.0), Ear(-1, (70.8, -21.5, -66.5), 35, 7, 1.03))
+EARS = (Ear(1, (72.4, -20, -66.5), 29, 9, 1.0), Ear(-1, (72.4, -21.5, -66.5), 35, 7, 1.03))
 
 
 def add_ear(cage: Cage, ear: Ear) -> tuple[list, list]:
@@ -63,8 +63,7 @@ def add_ear(cage: Cage, ear: Ear) -> tuple[list, list]:
     rim = np.array([OUTLINE[i] for i in spokes])
     front = np.array([FRONT[i] for i in spokes])[:, None]
     back_edge = ear.place(rim[:, 0], rim[:, 1], (-3.4 * (1 - front) - .6 * front)[:, 0])
-    behind = 0.45 * root + 0.55 * ear.place(*(CENTRE + .80 * (rim - CENTRE)).T, -6.5)
-    behind = (1 - front) * behind + front * (0.5 * root + 0.5 * back_edge)
+    behind = 0.5 * root + 0.5 * back_edge - 1.6 * (1 - front) * ear.axes()[2]
     levels = [behind, back_edge]
     for k, part in enumerate(INWARD):
         u, v = (CENTRE + part * (rim - CENTRE)).T
@@ -107,11 +106,11 @@ def _fill(cage: Cage, ear: Ear, ring: list) -> list:
 _OUT = CubicSpline(np.arange(21), np.vstack([OUTLINE, OUTLINE[:1]]), bc_type="periodic")
 RIDGES = [  # what, points (u, v), half width, height
     ("helix", CENTRE + .93 * (_OUT(np.linspace(5.5, 15.8, 80)) - CENTRE), 2.4, 2.3),
-    ("scapha", CENTRE + .79 * (_OUT(np.linspace(6.5, 13.5, 60)) - CENTRE), 2.1, -2.4),
+    ("scapha", CENTRE + .79 * (_OUT(np.linspace(6.5, 13.5, 60)) - CENTRE), 2.1, -1.8),
     ("antihelix", [(5, -15), (10, -11), (14, -4), (16, 4), (16, 11), (14.5, 17)], 3.1, 2.9),
     ("upper crus", [(14.5, 16), (13.5, 21), (11, 25.5)], 2.6, 2.0),
     ("lower crus", [(14.5, 15), (9, 17), (3, 18.5)], 2.3, 1.8),
-    ("fossa", [(11, 20), (6, 22.5)], 2.0, -1.6),
+    ("fossa", [(11, 20), (6, 22.5)], 2.0, -.9),
     ("crus of the helix", [(-9, 14), (-6.5, 8), (-1.5, 3.5)], 2.2, 4.2),
     ("tragus", [(-8.2, -1), (-7.6, -5)], 3.2, 4.4),
     ("antitragus", [(2, -17.5), (6, -15)], 2.8, 2.2),
@@ -124,7 +123,7 @@ def relief(u: NDArray, v: NDArray) -> NDArray:
     bowl = np.hypot((u - 2.5) / 11.5, (v + 2.5) / 15.5)
     h = -7.0 / (1 + np.exp((bowl - 0.86) / 0.09))
     upper = np.hypot((u - 2.0) / 10.0, (v - 11) / 5.5)
-    h -= 1.6 / (1 + np.exp((upper - 0.9) / 0.12))
+    h -= 0.8 / (1 + np.exp((upper - 0.9) / 0.12))
     h += 1.6 * np.exp(-((u - 2) / 9) ** 2 - ((v + 29) / 8) ** 2)        # the lobe
     h -= 0.0035 * np.maximum(-u, 0) ** 2                                 # runs out into the cheek
     for _, points, width, height in RIDGES:

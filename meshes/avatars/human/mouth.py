@@ -69,10 +69,10 @@ def _section(hole: NDArray, side: int, q: int, lip: int, project) -> list[NDArra
     rise, depth = POCKET[q]
     pocket = seam + [1.5 * (q / 8) ** 2, up * abs(lip) * rise, -depth - 1.2 * (q / 8)]
     border, belly, front, back, pocket = (p * flip for p in (border, belly, front, back, pocket))
-    around = project([0.52 * hole + 0.48 * border])[0]
+    around = project([0.66 * hole + 0.34 * border])[0]
     if lip:                                            # a little fuller than a straight line: teeth push from behind
-        around = around * [1, 1, .4] + [0, 0, .6 * (0.52 * hole + 0.48 * border)[2]]
-    near = 0.28 * around + 0.72 * border + [0, 0, -0.25]
+        around = around * [1, 1, .4] + [0, 0, .6 * (0.66 * hole + 0.34 * border)[2]]
+    near = 0.36 * around + 0.64 * border + [0, 0, -0.25]
     return [around, near, border, belly, front, back, pocket]
 
 

@@ -90,7 +90,7 @@ def teeth(name: str) -> Part:
         y[list(edge)] += shorter if upper else -shorter
         y[list(line)] += (-1.1 if upper else 1.1) * border
         sections.append(np.array([x, 0, z]) + o[:, None] * outward + y[:, None] * [0, 1, 0])
-    vertices, faces = tube(np.array(sections), caps=(True, True))
+    vertices, faces = tube(np.array(sections)[::-1], caps=(True, True))
     gum = set(GUM_ROWS[name])
     part = Part(name)
     part.add(vertices, faces, ["gums" if all(i >= len(sections) * 9 or i % 9 in gum for i in f) else "teeth" for f in faces])
@@ -108,7 +108,7 @@ def _mostly(face, gum) -> bool:
 
 TONGUE = [  # z, y of the middle, half width, half height
     (9.5, -74.2, 5.5, 1.6), (7, -73.6, 10, 3.0), (1, -72.6, 14.5, 4.8), (-8, -71.8, 17, 6.5), (-18, -71.6, 18, 7.5),
-    (-28, -72.5, 17.5, 8.0), (-37, -74.5, 15.5, 8.0), (-44, -77, 12, 7.0)]
+    (-28, -72.5, 17.5, 8.0), (-37, -73.5, 15, 7.5), (-43, -74.5, 11.5, 6.0)]
 
 
 def tongue() -> Part:
@@ -124,7 +124,7 @@ def tongue() -> Part:
 
 
 LINING = [  # z, bend back toward the corners, half width, up, down
-    (22.6, 14, 29.5, 13.8, 13.2), (21.2, 15, 31.5, 18.6, 15), (10, 8, 32.5, 20, 16.5), (-10, 2, 33, 20, 17),
+    (22.6, 14.5, 29.5, 13.6, 13.2), (22.2, 14, 31.0, 18.8, 15), (12, 6, 32.5, 20.5, 16.5), (-9, 2, 33, 20.5, 17),
     (-30, 0, 29, 18, 16), (-46, 0, 19, 13, 12), (-52, 0, 9, 6, 6)]
 MOUTH_MIDDLE = -70.0
 
@@ -133,7 +133,7 @@ def lining() -> Part:
     """Return the bag behind the lips, seen from inside; its rim lies behind the pockets of the lips."""
     n = 28
     around = 2 * np.pi * np.arange(n) / n
-    c, s = (np.sign(t) * np.abs(t) ** 0.8 for t in (np.cos(around), np.sin(around)))
+    c, s = (np.sign(t) * np.abs(t) ** 0.55 for t in (np.cos(around), np.sin(around)))
     sections = []
     for z, bend, w, up, down in LINING:
         sections.append(np.column_stack([w * c, MOUTH_MIDDLE + np.where(s > 0, up, down) * s, z - bend * c**2]))
