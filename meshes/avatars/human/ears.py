@@ -17,7 +17,7 @@ from scipy.interpolate import CubicSpline
 OUTLINE = np.array([(-9.5, -22), (-8.5, -30), (-4, -37.5), (3, -38.5), (9, -34), (13.5, -26), (17.5, -16.5), (22, -6.5),
                     (26, 3.5), (28, 14), (26.5, 24), (21, 31.5), (12.5, 35), (4, 34), (-3.5, 29.5), (-8.5, 22.5),
                     (-10.5, 13.5), (-11, 4), (-10.8, -5), (-10.3, -14)])
-FRONT = np.array([1, .8, .35, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, .1, .45, .85, 1, 1, 1, 1])    # 1 where it grows out of the cheek
+FRONT = np.array([1, .8, .35, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, .25, .6, .9, 1, 1, 1, 1])    # 1 where it grows out of the cheek
 INWARD = (0.93, 0.83, 0.68, 0.52, 0.36)                 # the loops inside the rim, as parts of the outline
 CENTRE = np.array([2.0, -1.0])
 
@@ -49,7 +49,7 @@ class Ear:
         return (places - np.array(self.origin) * [self.sign, 1, 1]) @ self.axes().T / self.size
 
 
-EARS = (Ear(1, (72.4, -20, -66.5), 29, 9, 1.0), Ear(-1, (72.4, -21.5, -66.5), 35, 7, 1.03))
+EARS = (Ear(1, (72.4, -20, -66.5), 29, 9, 1.0), Ear(-1, (72.8, -21.5, -66.8), 33, 8, 1.02))
 
 
 def add_ear(cage: Cage, ear: Ear) -> tuple[list, list]:

@@ -58,7 +58,7 @@ def tube(sections: NDArray, *, caps: tuple[bool, bool]) -> tuple[NDArray, list]:
 TEETH = (8.4, 6.8, 7.4, 6.8, 6.8, 9.0)          # widths from the middle to the first molar
 ARCH_WIDTH, ARCH_DEPTH, ARCH_BACK = 26.0, 36.0, -16.0
 # outward, up; the first and last rows lie in the gum
-UPPER = [(1.0, -53), (1.4, -57), (.8, -61), (1.1, -65.5), (.3, -71), (-1.2, -70.8), (-3.6, -65), (-4.6, -59), (-3.2, -53)]
+UPPER = [(.4, -53.6), (1.0, -57), (.8, -61), (1.1, -65.5), (.3, -71), (-1.2, -70.8), (-3.6, -65), (-4.6, -59), (-3.2, -53.6)]
 LOWER = [(-3.0, -83), (-4.2, -79), (-3.2, -75), (-1.4, -69.6), (-.2, -69.4), (.6, -73.5), (.3, -78), (.9, -81), (.6, -83.5)]
 GUM_ROWS = {"teeth_upper": (0, 1, 7, 8), "teeth_lower": (0, 1, 7, 8)}
 
@@ -85,7 +85,7 @@ def teeth(name: str) -> Part:
         outward /= np.linalg.norm(outward)
         o, y = profile.T.copy()
         edge, line = ((4, 5), (2, 6)) if upper else ((3, 4), (2, 6))
-        o -= border * np.where(np.isin(np.arange(9), (3, 4, 5, 6) if upper else (2, 3, 4, 5)), .75 * np.sign(o + .8), 0)
+        o -= border * np.where(np.isin(np.arange(9), (3, 4, 5, 6) if upper else (2, 3, 4, 5)), .45 * np.sign(o + .8), 0)
         shorter = 0.9 * border + 1.6 * (abs(along) / 45) ** 2
         y[list(edge)] += shorter if upper else -shorter
         y[list(line)] += (-1.1 if upper else 1.1) * border
