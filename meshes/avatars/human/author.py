@@ -22,7 +22,7 @@ from head_cage import BaseShape, head_cage, key
 from mouth import CONTACT, add_lips, add_nostrils, close_lips, facing_pairs
 from numpy.typing import NDArray
 from parts import Part, brow, fringe, lining, teeth, tongue
-from quads import Cage, catmull_clark, vertex_normals
+from quads import Cage, best_fans, catmull_clark, vertex_normals
 
 SEED = 1986
 BORDER, BALL_EDGE, POCKET = 3, 5, 6          # rings: the lips' border; the lids' inner edge and their pocket
@@ -93,9 +93,11 @@ def skin_part(skin: Skin) -> Part:
     nostril = skin.spread(skin.nostrils, whole=True) == 1
     part = Part("skin")
     names = []
-    for q in skin.quads:
-        names.append("nostril" if nostril[q].all() else "mouth" if inside[q].all() else "lips" if lip[q].all() else "skin")
-    part.add(skin.places, [tuple(q) for q in skin.quads.tolist()], names)
+    quads = best_fans(skin.places, skin.quads)
+    for q in quads:
+        found = (name for name, rows in (("nostril", nostril), ("mouth", inside), ("lips", lip)) if rows[q].all())
+        names.append(next(found, "skin"))
+    part.add(skin.places, [tuple(q) for q in quads.tolist()], names)
     return part
 
 

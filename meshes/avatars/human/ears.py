@@ -6,6 +6,7 @@ Ear axes: u to the back, v up, h away from the head; millimetres; the origin lie
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from head_cage import EAR_HOLE, hole_loop, key
@@ -134,7 +135,7 @@ def relief(u: NDArray, v: NDArray) -> NDArray:
 def _distance(u, v, points) -> NDArray:
     p = np.asarray(points, dtype=np.float64)
     best = np.full(np.shape(u), np.inf)
-    for a, b in zip(p, p[1:], strict=False):
+    for a, b in pairwise(p):
         t = np.clip(((u - a[0]) * (b - a)[0] + (v - a[1]) * (b - a)[1]) / ((b - a) @ (b - a)), 0, 1)
         best = np.minimum(best, np.hypot(u - a[0] - t * (b - a)[0], v - a[1] - t * (b - a)[1]))
     return best

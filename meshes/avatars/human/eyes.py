@@ -6,6 +6,7 @@ Directions at an eye: azimuth from straight ahead toward the temple, elevation u
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from head_cage import EYE_HOLE, hole_loop, key
@@ -44,9 +45,9 @@ class Eye:
 
 AZIMUTH = (-54, -46, -37, -26, -15, -2, 11, 24, 37, 49, 59)
 EYES = (
-    Eye(1, (29.6, -.6, -.6), AZIMUTH, (-11, -2, 4.5, 9, 12, 13, 12.5, 10, 5.5, -.5, -7),
+    Eye(1, (29.6, -.6, 1.7), AZIMUTH, (-11, -2, 4.5, 9, 12, 13, 12.5, 10, 5.5, -.5, -7),
         (-11, -15, -18, -19.5, -20.5, -21, -21, -20, -17.5, -13.5, -7), hood=2.8, bag=2.4),
-    Eye(-1, (-29.6, -1.0, -.6), AZIMUTH, (-11, -3.5, 1.5, 5.5, 8, 9, 8, 5, .5, -4.5, -10),
+    Eye(-1, (-29.6, -1.0, 1.7), AZIMUTH, (-11, -3.5, 1.5, 5.5, 8, 9, 8, 5, .5, -4.5, -10),
         (-11, -15, -17.5, -19, -19.5, -19.5, -19, -18, -16, -13.5, -10), hood=3.4, bag=1.9),
 )
 
@@ -89,7 +90,7 @@ def add_lids(cage: Cage, eye: Eye) -> list[list]:
             name = ("eye", eye.sign, k, *rc)
             cage.vertex(name, place)
             rings[k].append(name)
-    for outer, inner in zip(rings, rings[1:], strict=False):
+    for outer, inner in pairwise(rings):
         cage.band(outer, inner)
     return rings
 
@@ -112,7 +113,7 @@ def _section(eye: Eye, orbit: NDArray, i: int, lid: int) -> list[NDArray]:
 
     if lid > 0:
         hang = eye.hood * (0.35 + 0.65 * t)             # an old lid hangs lower outside
-        fold = at(0.60 - 0.055 * hang * middle, skin(0.60) + 0.75 * hang * middle)
+        fold = at(0.60 - 0.055 * hang * middle, skin(0.60) + 0.45 * hang * middle)
         crease = at(0.44, ball + 1.9 + 1.0 * (1 - middle))
         pretarsal = at(0.20, ball + 2.25)
     elif lid < 0:
@@ -159,12 +160,12 @@ def eyeball(eye: Eye) -> tuple[NDArray, list[tuple[int, ...]], list[str]]:
         angles.append(float(np.interp(across, np.sin(a) * _radius(a), a)))
     angles += [np.radians(a) for a in BALL_ANGLES]
     turn_by = 2 * np.pi * np.arange(AROUND) / AROUND
-    vertices = [eye.origin + [0, 0, _radius(0.0)]]
+    vertices = [eye.origin + np.array([0, 0, _radius(0.0)])]
     for a in angles:
         r = _radius(a)
         for b in turn_by:
             vertices.append(eye.origin + r * np.array([np.sin(a) * np.cos(b), np.sin(a) * np.sin(b), np.cos(a)]))
-    vertices.append(eye.origin - [0, 0, BALL])
+    vertices.append(eye.origin - np.array([0, 0, BALL]))
     faces, materials = [], []
     for j in range(AROUND):
         k = (j + 1) % AROUND

@@ -5,6 +5,8 @@ Tables run from the middle of the lip (0) to the corner (8); millimetres, before
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 from head_cage import MOUTH_HOLE, NOSTRIL_HOLE, hole_loop, key
 from numpy.typing import NDArray
@@ -49,38 +51,41 @@ def add_lips(cage: Cage, project) -> list[list]:
             name = ("lips", k, *rc)
             cage.vertex(name, place)
             rings[k].append(name)
-    for outer, inner in zip(rings, rings[1:], strict=False):
+    for outer, inner in pairwise(rings):
         cage.band(outer, inner)
     return rings
 
 
 def _section(hole: NDArray, side: int, q: int, lip: int, project) -> list[NDArray]:
     flip = np.array([side, 1, 1])
-    seam = SEAM[q]
-    up = 1 if lip >= 0 else -1
-    border = seam + [0, *(UPPER_BORDER if up > 0 else LOWER_BORDER)[q]]
-    belly = seam + [0, *(UPPER_BELLY if up > 0 else LOWER_BELLY)[q]]
-    outward = 1.0 if q == 8 else 0.0
-    border = border + [1.4 * outward, 0, -.9 * outward]
-    belly = belly + [.5 * outward, 0, 0]
-    front = seam + [0, up * abs(lip) * SLIT / 2, 0]
-    away = np.array([0.12 * seam[0], 0, 0])
-    back = seam - away * 0.35 + [0, up * abs(lip) * (SLIT / 2 + 0.0), -INNER_DEPTH[q]]
+    seam, up, open_ = SEAM[q], 1 if lip >= 0 else -1, abs(lip)       # at the corner the two lips are one
+
+    def beside(x: float, y: float, z: float) -> NDArray:
+        return seam + np.array([x, y, z])
+
+    corner = 1.0 if q == 8 else 0.0
+    dy, dz = (UPPER_BORDER if up > 0 else LOWER_BORDER)[q]
+    border = beside(1.4 * corner, dy, dz - .9 * corner)
+    dy, dz = (UPPER_BELLY if up > 0 else LOWER_BELLY)[q]
+    belly = beside(.5 * corner, dy, dz)
+    front = beside(0, up * open_ * SLIT / 2, 0)
+    back = beside(-.042 * seam[0], up * open_ * SLIT / 2, -INNER_DEPTH[q])
     rise, depth = POCKET[q]
-    pocket = seam + [1.5 * (q / 8) ** 2, up * abs(lip) * rise, -depth - 1.2 * (q / 8)]
+    pocket = beside(1.5 * (q / 8) ** 2, up * open_ * rise, -depth - 1.2 * (q / 8))
     border, belly, front, back, pocket = (p * flip for p in (border, belly, front, back, pocket))
-    around = project([0.66 * hole + 0.34 * border])[0]
+    between = 0.66 * hole + 0.34 * border
+    around = project([between])[0]
     if lip:                                            # a little fuller than a straight line: teeth push from behind
-        around = around * [1, 1, .4] + [0, 0, .6 * (0.66 * hole + 0.34 * border)[2]]
-    near = 0.36 * around + 0.64 * border + [0, 0, -0.25]
+        around[2] = .4 * around[2] + .6 * between[2]
+    near = 0.36 * around + 0.64 * border - np.array([0, 0, .25])
     return [around, near, border, belly, front, back, pocket]
 
 
 def close_lips(places: NDArray, upper: NDArray, lower: NDArray) -> None:
     """Lay pairs of contact vertices (upper[i] over lower[i]) a slit apart, in place."""
     middle = (places[upper] + places[lower]) / 2
-    places[upper] = middle + [0, SLIT / 2, 0]
-    places[lower] = middle - [0, SLIT / 2, 0]
+    half = np.array([0, SLIT / 2, 0])
+    places[upper], places[lower] = middle + half, middle - half
 
 
 def add_nostrils(cage: Cage) -> list:

@@ -93,3 +93,21 @@ def vertex_normals(places: NDArray[np.float64], quads: NDArray[np.int64]) -> NDA
     for k in range(4):
         np.add.at(out, quads[:, k], cross)
     return out / np.maximum(np.linalg.norm(out, axis=1, keepdims=True), 1e-12)
+
+
+def best_fans(places: NDArray[np.float64], quads: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Return the quads, begun at the corner from which a fan of two triangles has no needles.
+
+    Readers that want triangles split a quad from its first corner.
+    """
+    def worst(q):
+        a, b, c, e = (places[q[:, k]] for k in range(4))
+        height = []
+        for u, v, w in ((a, b, c), (a, c, e)):
+            longest = np.max([np.linalg.norm(v - u, axis=1), np.linalg.norm(w - v, axis=1),
+                              np.linalg.norm(u - w, axis=1)], axis=0)
+            height.append(np.linalg.norm(np.cross(v - u, w - u), axis=1) / longest**2)
+        return np.minimum(*height)
+
+    turned = np.roll(quads, -1, axis=1)
+    return np.where((worst(turned) > 1.25 * worst(quads))[:, None], turned, quads)   # 1.25: leave near ties alone
