@@ -21,7 +21,7 @@ from eyes import EYES, add_lids, eyeball, press_on_ball
 from head_cage import BaseShape, head_cage, key
 from mouth import CONTACT, add_lips, add_nostrils, close_lips, facing_pairs
 from numpy.typing import NDArray
-from parts import Part, brow, fringe, lining, teeth, tongue
+from parts import Part, brows, fringe, lining, teeth, tongue
 from quads import Cage, best_fans, catmull_clark, vertex_normals
 
 SEED = 1986
@@ -112,7 +112,7 @@ def author() -> tuple[list[Part], Skin]:
         part.add(*eyeball(eye))
         parts.append(part)
     parts += [teeth("teeth_upper"), teeth("teeth_lower"), tongue(), lining()]
-    parts += [brow(sign, skin.places, normals, rng) for sign in (1, -1)]
+    parts.append(brows(skin.places, normals, rng))
     bare = skin.spread([k for _, every in skin.ears for k in every]) == 0
     parts.append(fringe(skin.places[bare], rng))
     return parts, skin

@@ -152,8 +152,16 @@ BROW_HALF = (2.0, 3.4, 3.8, 3.5, 2.6, 0.9)
 TUFTS = 44
 
 
-def brow(sign: int, skin: NDArray, normals: NDArray, rng) -> Part:
-    """Return one bushy brow: a thin mat on the skin with tufts of hair growing out of it."""
+def brows(skin: NDArray, normals: NDArray, rng) -> Part:
+    """Return both bushy brows."""
+    part = Part("brows")
+    for sign in (1, -1):
+        _add_brow(part, sign, skin, normals, rng)
+    return part
+
+
+def _add_brow(part: Part, sign: int, skin: NDArray, normals: NDArray, rng) -> None:
+    """Add one brow: a thin mat on the skin with tufts of hair growing out of it."""
     front = np.flatnonzero((normals[:, 2] > 0.1) & (skin[:, 2] > -20))
     tree = cKDTree(skin[front, :2])
     points = np.array(BROWS[sign], dtype=np.float64)
@@ -183,8 +191,7 @@ def brow(sign: int, skin: NDArray, normals: NDArray, rng) -> Part:
         for b in range(4):
             q = (a * 5 + b, (a + 1) * 5 + b, (a + 1) * 5 + b + 1, a * 5 + b + 1)
             faces.append(q if sign > 0 else q[::-1])
-    part = Part("brow_L" if sign > 0 else "brow_R")
-    part.add(mat.reshape(-1, 3), faces, "white hair")
+    part.add(mat.reshape(-1, 3), faces, "brows_white")
     for i in range(TUFTS):
         s = t[-1] * (i + .5) / TUFTS
         side = ((i * 0.618) % 1.0 - .55) * 1.7
@@ -195,8 +202,7 @@ def brow(sign: int, skin: NDArray, normals: NDArray, rng) -> Part:
         out = np.append(tan, 0) * (.55 + .9 * (1 - fan)) + np.append(up, 0) * (.7 * fan + .05 - .5 * side) + .75 * n
         out += .18 * rng.standard_normal(3)
         out /= np.linalg.norm(out)
-        part.add(*_tuft(root + .3 * n, out, n, length=4.8 + 2.6 * rng.random(), width=.8), "white hair")
-    return part
+        part.add(*_tuft(root + .3 * n, out, n, length=4.8 + 2.6 * rng.random(), width=.8), "brows_white")
 
 
 def _tuft(root, out, normal, *, length: float, width: float) -> tuple[NDArray, list]:
@@ -253,5 +259,5 @@ def fringe(skin: NDArray, rng) -> Part:
     n = FRINGE_UP + 1
     faces = [(k * n + j, (k + 1) * n + j, (k + 1) * n + j + 1, k * n + j + 1)
              for k in range(FRINGE_AROUND) for j in range(FRINGE_UP)]
-    part.add((VIEW_CENTRE + d * r[..., None]).reshape(-1, 3), faces, "white hair")
+    part.add((VIEW_CENTRE + d * r[..., None]).reshape(-1, 3), faces, "hair_white")
     return part

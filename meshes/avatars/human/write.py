@@ -20,7 +20,8 @@ DECIMALS = 4
 COLOURS = {  # sRGB 0..255
     "skin": (214, 164, 140), "lips": (176, 108, 100), "nostril": (134, 82, 68), "mouth": (92, 34, 30),
     "pupil": (16, 12, 11), "iris": (104, 124, 138), "limbus": (64, 78, 88), "sclera": (226, 219, 210),
-    "teeth": (226, 208, 174), "gums": (172, 96, 92), "tongue": (182, 98, 94), "white hair": (205, 200, 194)}
+    "teeth": (226, 208, 174), "gums": (172, 96, 92), "tongue": (182, 98, 94), "brows_white": (196, 190, 183),
+    "hair_white": (205, 200, 194)}
 
 
 def to_file(places: NDArray) -> NDArray:
@@ -65,8 +66,8 @@ def mtl_text() -> str:
     """Return the materials with their plain colours."""
     lines = [f"# Source: {SOURCE}."]
     for name, colour in COLOURS.items():
-        linear = " ".join(f"{c / 255:.4f}" for c in colour)
-        lines += [f"newmtl {name}", f"Kd {linear}", "Ks 0.0400 0.0400 0.0400", "Ns 20"]
+        kd = " ".join(f"{c / 255:.4f}" for c in colour)
+        lines += [f"newmtl {name}", f"Kd {kd}", "Ks 0.0400 0.0400 0.0400", "Ns 20"]
     return "\n".join(lines) + "\n"
 
 
