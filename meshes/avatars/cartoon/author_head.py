@@ -23,6 +23,7 @@ EYE = np.array([0.395, 0.12, 0.49])       # centre of the left eyeball
 EYE_RADIUS = 0.345
 LID = 0.034                                # thickness of a lid
 LID_GAP = 0.006                            # between lid and eyeball: more than a chord of the margin cuts off the ball
+EAR = np.array([0.852, 0.05, -0.02])       # root of the left ear
 MOUTH = -0.535                             # height of the slit in the middle
 MOUTH_HALF = 0.29                          # half its width
 SLIT = 0.0032                              # neutral gap between the lips in the middle
@@ -65,7 +66,7 @@ def head_shape(p: Array) -> Array:
     d = _join(d, np.maximum(_neck(p), p[:, 1] + 0.5), 0.14)
     d = _join(d, _pair(p, (0.50, -0.36, 0.40), (0.31, 0.27, 0.30)), 0.22)      # cheeks
     d = _join(d, _ellipsoid(p, (0.0, -0.50, 0.58), (0.42, 0.24, 0.27)), 0.24)  # muzzle
-    d = _join(d, _ellipsoid(p, (0.0, -0.78, 0.60), (0.27, 0.18, 0.21)), 0.16)  # chin
+    d = _join(d, _ellipsoid(p, (0.0, -0.76, 0.60), (0.30, 0.20, 0.22)), 0.14)  # chin
     return _join(d, _pair(p, (0.36, 0.50, 0.53), (0.30, 0.13, 0.16)), 0.16)    # brow ridge
 
 
@@ -135,18 +136,36 @@ def lid_ring(outside: float, radius: float, count: int = 20) -> Array:
 
 
 def orbit_ring(count: int = 20) -> Array:
-    """Return the loop round the left eye where the lids' skin goes over into the face, laid out as seen from ahead."""
+    """Return the loop round the left eye where the lids' skin goes over into the face."""
     angle = 2 * np.pi * np.arange(count) / count
     c, s = np.cos(angle), np.sin(angle)
     beside_nose = np.where((c < 0) & (s < 0), 1.0 - 0.45 * np.abs(c * s), 1.0)
-    x = EYE[0] + np.where(c > 0, 0.345, 0.325) * c
+    x = EYE[0] + 0.325 * c
     y = EYE[1] + np.where(s > 0, 0.44, 0.335) * s * beside_nose
-    return np.stack([x, y, front(x, y, face_shape)], axis=1)
+    return on_lids(np.stack([x, y, 0 * x], axis=1), lid_ring(27.0, EYE_RADIUS))
 
 
-def _ahead(points: Array) -> Array:
-    """Return points moved forwards or back onto the face."""
-    return np.stack([points[:, 0], points[:, 1], front(points[:, 0], points[:, 1], face_shape)], axis=1)
+def on_lids(ahead: Array, around: Array) -> Array:
+    """Return rings round the left eye on the face: the inner half of ``ahead`` goes there along z, the outer half of
+    ``around`` away from the ball, for there the face turns away."""
+    c = np.cos(2 * np.pi * np.arange(len(ahead)) / len(ahead))
+    outer = np.clip(1.4 * c - 0.1, 0.0, 1.0)[:, None]
+    ahead = np.stack([*ahead[:, :2].T, front(ahead[:, 0], ahead[:, 1], face_shape)], axis=1)
+    return onto((1.0 - outer) * ahead + outer * from_ball(around), face_shape)
+
+
+def from_ball(points: Array) -> Array:
+    """Return where rays from the left eyeball's centre through points leave the face first: steps, then bisection."""
+    ray = (points - EYE) / np.linalg.norm(points - EYE, axis=1, keepdims=True)
+    reach, step = np.full(len(ray), EYE_RADIUS), 0.004
+    for _ in range(150):
+        reach += np.where(face_shape(EYE + reach[:, None] * ray) < 0, step, 0.0)
+    low, high = reach - step, reach
+    for _ in range(40):
+        middle = (low + high) / 2
+        inside = face_shape(EYE + middle[:, None] * ray) < 0
+        low, high = np.where(inside, middle, low), np.where(inside, high, middle)
+    return EYE + low[:, None] * ray
 
 
 # ---- the mesh ----
@@ -209,14 +228,17 @@ def _mirrored_hole(hole: tuple[int, int, int, int]) -> tuple[int, int, int, int]
     return (-hole[1], -hole[0], *hole[2:])
 
 
-def mouth_ring(half: float, above: float, below: float, ahead: float, *, behind_face: Array | None = None) -> Array:
-    """Return a ring round the slit: its half width, heights over and under the slit, and how far before the face."""
+def mouth_ring(half: float, above: float, below: float, ahead: float, *, flat: bool = False) -> Array:
+    """Return a ring round the slit: its half width, heights over and under the slit, and how far before the face.
+
+    flat: the depth is measured from the height of the slit, for what lies deep inside.
+    """
     angle = 2 * np.pi * np.arange(20) / 20
     c, s = np.cos(angle), np.sin(angle)
     x = half * c
+    s = np.sign(s) * np.abs(s) ** 0.6 if flat else s
     y = MOUTH + 0.055 * (x / MOUTH_HALF) ** 2 + np.where(s > 0, above, below) * s
-    z = front(x, y) + ahead if behind_face is None else front(x, MOUTH + 0 * x) + behind_face
-    return np.stack([x, y, z], axis=1)
+    return np.stack([x, y, front(x, MOUTH if flat else y) + ahead], axis=1)
 
 
 def nose_ring(polar: float) -> Array:
@@ -227,20 +249,24 @@ def nose_ring(polar: float) -> Array:
     return np.array([0.0, -0.185, 0.93]) + direction * (0.20, 0.17, 0.19)
 
 
-def ear_ring(long: float, wide: float, back: float, away: float, swell: float = 0.0) -> Array:
-    """Return a ring of the left ear in its own plane: half length and width, shift to the back, height off the head."""
+def ear_root(long: float, wide: float, back: float) -> Array:
+    """Return a ring on the head round the root of the left ear: half its length and width, how far it lies behind."""
     angle = 2 * np.pi * np.arange(12) / 12
-    out = np.array([np.cos(np.radians(52.0)), 0.0, -np.sin(np.radians(52.0))])       # the way the ear leans away
-    normal = np.array([np.sin(np.radians(52.0)), 0.0, np.cos(np.radians(52.0))])     # where its hollow looks
-    tilt = np.radians(-12.0)
-    along = np.cos(tilt) * np.array([0.0, 1.0, 0.0]) - np.sin(tilt) * out
-    across = np.cos(tilt) * out + np.sin(tilt) * np.array([0.0, 1.0, 0.0])
+    across = np.stack([0 * angle, long * np.sin(angle), -back - wide * np.cos(angle)], axis=1)
+    return onto(EAR + across, head_shape)
+
+
+def ear_ring(long: float, wide: float, out: float, ahead: float) -> Array:
+    """Return a ring of the left ear in its own plane, which leans back: half its length and width, how far its middle is
+    out from the root, and how far it lies before the plane."""
+    angle = 2 * np.pi * np.arange(12) / 12
     c, s = np.cos(angle), np.sin(angle)
-    taper = 1.0 + 0.22 * s + swell * c                                               # wider above than at the lobe
-    return (EAR + long * s[:, None] * along + (back + wide * taper * c)[:, None] * across + away * normal)
-
-
-EAR = np.array([0.80, 0.06, -0.02])
+    lean, tilt = np.radians(50.0), np.radians(10.0)
+    outwards = np.array([np.cos(lean), 0.0, -np.sin(lean)])
+    facing = np.array([np.sin(lean), 0.0, np.cos(lean)])
+    upwards = np.cos(tilt) * np.array([0.0, 1.0, 0.0]) + np.sin(tilt) * outwards
+    taper = 1.0 + 0.22 * s                                                          # wider above than at the lobe
+    return EAR + long * s[:, None] * upwards + (out + wide * taper * c)[:, None] * outwards + ahead * facing
 
 
 def head_skin() -> Skin:
@@ -311,7 +337,7 @@ def _set_loops(skin: Skin, grid: dict[tuple[int, int], int]) -> NDArray[np.bool_
     place("eye_R_0", _mirrored(eye))
     place("nose_0", onto(nose_ring(112.0) * (1.0, 1.0, 0.98), head_shape))
     place("mouth_0", mouth_ring(MOUTH_HALF + 0.12, 0.14, 0.16, 0.0))
-    ear = onto(ear_ring(0.31, 0.20, 0.04, 0.0), head_shape)
+    ear = ear_root(0.30, 0.19, 0.05)
     place("ear_L_0", ear)
     place("ear_R_0", _mirrored(ear))
     angle = 2 * np.pi * np.arange(-COLUMNS // 2, COLUMNS // 2) / COLUMNS
@@ -354,8 +380,9 @@ def _relax(skin: Skin, grid: dict[tuple[int, int], int], loose: NDArray[np.intp]
 def _eyes(skin: Skin) -> None:
     """Fill the holes of the eyes: lid skin over the ball, the rim, and a lining behind it."""
     full = EYE_RADIUS + LID
-    orbit, near = orbit_ring(), lid_ring(11.0, full)
-    rings = [("skin", _ahead(0.42 * orbit + 0.58 * near)), ("skin", _ahead(near)), ("lid", lid_ring(4.0, full)),
+    near = lid_ring(11.0, full)
+    between = 0.42 * orbit_ring() + 0.58 * near
+    rings = [("skin", on_lids(between, between)), ("skin", on_lids(near, near)), ("lid", lid_ring(4.0, full)),
              ("lid", lid_ring(0.3, EYE_RADIUS + 0.6 * LID)), ("lid", lid_ring(0.0, EYE_RADIUS + LID_GAP)),
              ("lid", lid_ring(9.0, EYE_RADIUS + LID_GAP))]
     for side in "LR":
@@ -373,10 +400,10 @@ def _mouth(skin: Skin) -> None:
              ("skin", mouth_ring(w + 0.018, 0.058, 0.090, 0.016)),
              ("lips", mouth_ring(w + 0.004, 0.030, 0.048, 0.036)),
              ("lips", mouth_ring(w, g, g, 0.022)),
-             ("lips", mouth_ring(w - 0.004, 0.012, 0.012, 0.0, behind_face=np.array(-0.045))),
-             ("mouth", mouth_ring(w + 0.01, 0.10, 0.10, 0.0, behind_face=np.array(-0.10))),
-             ("mouth", mouth_ring(w + 0.02, 0.15, 0.15, 0.0, behind_face=np.array(-0.24))),
-             ("mouth", mouth_ring(w - 0.06, 0.14, 0.14, 0.0, behind_face=np.array(-0.42)))]
+             ("lips", mouth_ring(w - 0.004, 0.012, 0.012, -0.040)),
+             ("mouth", mouth_ring(w + 0.004, 0.13, 0.14, -0.055)),
+             ("mouth", mouth_ring(w + 0.01, 0.17, 0.17, -0.25, flat=True)),
+             ("mouth", mouth_ring(w - 0.06, 0.15, 0.15, -0.50, flat=True))]
     outer = skin.rings["mouth_0"]
     for number, (material, ring) in enumerate(rings, 1):
         inner = skin.add(ring)
@@ -400,9 +427,9 @@ def _nose(skin: Skin) -> None:
 
 def _ears(skin: Skin) -> None:
     """Fill the holes of the ears: the back, the rim, and the hollow."""
-    rings = [("skin", onto(ear_ring(0.21, 0.11, 0.03, 0.0), head_shape)), ("skin", ear_ring(0.23, 0.13, 0.08, 0.02)), ("skin", ear_ring(0.265, 0.165, 0.12, 0.06)),
-             ("skin", ear_ring(0.25, 0.15, 0.115, 0.11)), ("nose", ear_ring(0.185, 0.10, 0.10, 0.095)),
-             ("nose", ear_ring(0.12, 0.06, 0.07, 0.045))]
+    rings = [("skin", ear_root(0.19, 0.055, 0.08)), ("skin", ear_ring(0.215, 0.125, 0.165, -0.010)),
+             ("skin", ear_ring(0.26, 0.15, 0.185, 0.03)), ("skin", ear_ring(0.25, 0.145, 0.185, 0.075)),
+             ("nose", ear_ring(0.185, 0.095, 0.18, 0.07)), ("nose", ear_ring(0.125, 0.055, 0.155, 0.025))]
     for side in "LR":
         outer = skin.rings[f"ear_{side}_0"]
         for number, (material, ring) in enumerate(rings, 1):

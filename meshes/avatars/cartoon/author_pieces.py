@@ -101,7 +101,7 @@ def _swept(path: Array, across: Array, ahead: Array, wide: Array, thick: Array, 
             for p, a, h, w, t in zip(path, across, ahead, wide, thick, strict=True)]
 
 
-def _above(points: Array, lift: float) -> Array:
+def _above(points: Array, lift) -> Array:
     """Return points moved to a height over the head."""
     return onto(points, lambda p: head_shape(p) - lift)
 
@@ -181,7 +181,11 @@ def cap() -> Piece:
         soft = 0.016 * np.cos(8 * np.arctan2(s, c)) * (number in (4, 5, 6))            # the seams of its eight panels
         sag = -0.05 * s * (number >= 4)                                                # it leans forward
         rings.append(np.stack([(wide - soft) * c, high + sag, shift + (long - soft) * s], axis=1))
-    piece.tube([_askew(ring) for ring in rings], ["cap_band"] * 3 + ["cap"] * 6, tips=(None, _askew([[0, 1.142, -0.10]])[0]))
+    rings = [_askew(ring) for ring in rings]
+    behind = 0.5 - 0.5 * s                                                             # room for the hair
+    for number, lift in enumerate((0.03, 0.035, 0.07, 0.075)):
+        rings[number] = _above(rings[number], lift + 0.055 * np.minimum(2.0 * behind, 1.0))
+    piece.tube(rings, ["cap_band"] * 3 + ["cap"] * 6, tips=(None, _askew([[0, 1.142, -0.10]])[0]))
     piece = piece.outwards()
     return piece
 
@@ -198,17 +202,17 @@ def button() -> Piece:
 def visor() -> Piece:
     """Return the cap's visor: a thick crescent, bent down a little."""
     piece = Piece("cap")
-    angle = np.radians(np.linspace(-62.0, 62.0, 15))
+    angle = np.radians(np.linspace(-60.0, 60.0, 15))
     rings = []
     for t in angle:
-        reach = np.cos(t * 90.0 / 66.0) ** 0.75
+        reach = 0.12 + 0.88 * np.cos(t * 90.0 / 64.0) ** 0.75
         out = np.array([np.sin(t), 0.0, np.cos(t)])
         root = np.array([0.765 * out[0], 0.675, -0.07 + 0.77 * out[2]])
-        edge = root + reach * np.array([0.06 * np.sin(t), -0.05, 0.36]) - [0.0, 0.06 * np.sin(t) ** 2, 0.0]
+        edge = root + reach * (0.13 * out + [0.0, -0.05, 0.24]) - [0.0, 0.06 * np.sin(t) ** 2, 0.0]
         middle = (root + edge) / 2 + [0.0, 0.03 * reach, 0.0]
         thick = np.array([0.0, 0.026, 0.0])
-        rings.append(np.array([root - out * 0.05 + thick, middle + thick, edge + 0.8 * thick, edge + 0.02 * reach * out,
-                               edge - 0.8 * thick, middle - thick, root - out * 0.05 - thick]))
+        rings.append(np.array([root - out * 0.02 + thick, middle + thick, edge + 0.8 * thick, edge + 0.02 * reach * out,
+                               edge - 0.8 * thick, middle - thick, root - out * 0.02 - thick]))
     piece.tube([_askew(ring) for ring in rings], "cap_band",
                tips=(_askew([rings[0].mean(axis=0)])[0], _askew([rings[-1].mean(axis=0)])[0]))
     return piece.outwards()
@@ -217,32 +221,23 @@ def visor() -> Piece:
 def hair() -> Piece:
     """Return the hair below the cap, from ear to ear round the back of the head, its lower edge in tufts."""
     piece = Piece("hair")
-    around = np.radians(np.linspace(58.0, 302.0, 27))
-    # lower edge by angle: a sideburn before the ear, over the ear, down to the nape
-    edge = np.interp(np.minimum(around, 2 * np.pi - around), np.radians([58, 66, 74, 84, 104, 118, 135, 180]),
-                     [0.40, 0.12, 0.10, 0.40, 0.40, 0.05, -0.20, -0.34])
-    edge = edge - 0.05 * (np.arange(27) % 2)
+    half = np.radians([56, 59, 63, 67, 71, 75, 80, 88, 97, 106, 115, 124, 134, 145, 156, 168, 180])
+    around = np.concatenate([half, 2 * np.pi - half[-2::-1]])
+    # lower edge by angle: a sideburn before the ear, over the ear, down to the nape; in tufts
+    edge = np.interp(half, np.radians([56, 59, 63, 67, 71, 75, 80, 106, 115, 124, 134, 180]),
+                     [0.52, 0.40, 0.17, 0.08, 0.04, 0.10, 0.41, 0.42, 0.20, 0.02, -0.14, -0.34])
+    edge = edge - 0.05 * (np.arange(len(half)) % 2) * (half > np.radians(110))
+    edge = np.concatenate([edge, edge[-2::-1]])
     rows = []
     for u, lift in ((0.0, -0.012), (0.05, 0.035), (0.35, 0.06), (0.70, 0.06), (1.0, 0.045)):
         y = edge + u * (0.68 - edge)
         start = np.stack([0.7 * np.sin(around), y, -0.08 + 0.7 * np.cos(around)], axis=1)
+        lift = np.where(around == around.clip(half[1], 2 * np.pi - half[1]), lift, -0.012)   # ends in the skin
         rows.append(piece.add(_above(start, lift)))
     for a, b in zip(rows, rows[1:], strict=False):
         for i in range(len(a) - 1):
             piece._face((a[i], a[i + 1], b[i + 1], b[i]), "hair")
     return piece
-
-
-def lock() -> Piece:
-    """Return a lock that has slipped out from under the cap on the forehead."""
-    t = np.linspace(0.0, 1.0, 8)
-    x = -0.10 - 0.20 * t - 0.03 * np.sin(np.pi * t)
-    y = 0.80 - 0.16 * t + 0.05 * np.maximum(t - 0.6, 0.0) / 0.4
-    path, along, across, ahead = _on_face(x, y, 0.03 + 0.05 * np.sin(np.pi * t))
-    wide = 0.075 * (1.0 - 0.85 * t)
-    piece = Piece("hair")
-    piece.tube(_swept(path, across, ahead, wide, 0.6 * wide, 7), "hair", tips=(path[0] - 0.02 * along[0], path[-1] + 0.02 * along[-1]))
-    return piece.outwards()
 
 
 def collar() -> Piece:
@@ -266,7 +261,7 @@ def teeth(row: str) -> Piece:
     """Return a row of big teeth with its gum; the upper one has a gap in the middle."""
     piece = Piece(f"teeth_{row}")
     up = 1.0 if row == "upper" else -1.0
-    half, deep, ahead, edge = (0.215, 0.20, -0.105, MOUTH + 0.012) if row == "upper" else (0.195, 0.18, -0.135, MOUTH - 0.014)
+    half, deep, ahead, edge = (0.21, 0.20, -0.130, MOUTH + 0.012) if row == "upper" else (0.18, 0.18, -0.175, MOUTH - 0.014)
     z0 = float(front(np.array(0.0), np.array(MOUTH))) + ahead
     bounds = np.array([0.0, 0.31, 0.56, 0.78, 1.0]) * 0.5 * np.pi                    # four teeth a side
     stations = []                                                                   # (angle, how much of the tooth is there)
@@ -279,7 +274,7 @@ def teeth(row: str) -> Piece:
     for t, f in zip(angles, full, strict=True):
         out = np.array([np.sin(t), 0.0, np.cos(t)])
         spot = np.array([half * np.sin(t), edge, z0 - deep * (1 - np.cos(t))])
-        tall, thick, gum = 0.075, 0.030 * f, 0.12
+        tall, thick, gum = 0.075, 0.030 * f, 0.12 if row == "upper" else 0.10
         rings.append(np.array([spot + up * np.array([0, (1 - f) * 0.10, 0]) + 0.2 * thick * out,
                                spot + [0, up * 0.035, 0] + thick * out, spot + [0, up * tall, 0] + 0.8 * thick * out,
                                spot + [0, up * gum, 0] + 0.2 * thick * out, spot + [0, up * gum, 0] - 0.035 * out,
@@ -292,14 +287,14 @@ def teeth(row: str) -> Piece:
 
 def tongue() -> Piece:
     """Return the tongue: flat, with a furrow."""
-    z0 = float(front(np.array(0.0), np.array(MOUTH))) - 0.17
+    z0 = float(front(np.array(0.0), np.array(MOUTH))) - 0.23
     t = np.linspace(0.0, 1.0, 8)
     c, s = _circle(10)
     rings = []
     for u in t:
-        wide = 0.135 * np.sqrt(np.sin(np.pi * (0.10 + 0.62 * u)))
+        wide = 0.118 * np.sqrt(np.sin(np.pi * (0.10 + 0.62 * u)))
         high = 0.042 * np.sqrt(np.sin(np.pi * (0.10 + 0.62 * u)))
-        centre = np.array([0.0, MOUTH - 0.075 - 0.02 * u**2 + 0.012 * np.sin(np.pi * u), z0 - 0.27 * u])
+        centre = np.array([0.0, MOUTH - 0.075 - 0.02 * u**2 + 0.012 * np.sin(np.pi * u), z0 - 0.22 * u])
         furrow = -0.014 * np.exp(-(c / 0.25) ** 2) * (s > 0)
         rings.append(centre + np.stack([wide * c, high * s + furrow, 0 * c], axis=1))
     piece = Piece("tongue")
@@ -310,4 +305,4 @@ def tongue() -> Piece:
 def pieces() -> list[Piece]:
     """Return all pieces but the skin."""
     return [eye("L"), eye("R"), teeth("upper"), teeth("lower"), tongue(), brow("L"), brow("R"), moustache(), cap(), visor(),
-            button(), hair(), lock(), collar()]
+            button(), hair(), collar()]
