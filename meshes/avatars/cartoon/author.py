@@ -19,9 +19,9 @@ from author_pieces import Piece, brow_place, pieces
 DECIMALS = 5
 COLOURS = {                                        # sRGB 0..255
     "skin": (236, 184, 146), "nose": (226, 148, 120), "lid": (224, 164, 130), "lips": (190, 98, 88),
-    "mouth": (96, 36, 34), "sclera": (244, 242, 236), "iris": (66, 148, 140), "limbus": (28, 74, 78),
+    "mouth": (120, 44, 42), "sclera": (244, 242, 236), "iris": (66, 148, 140), "limbus": (28, 74, 78),
     "pupil": (18, 16, 18), "highlight": (255, 255, 255), "teeth": (246, 240, 226), "gums": (190, 98, 96),
-    "tongue": (204, 104, 100), "brows": (176, 82, 34), "moustache": (186, 90, 38), "cap": (40, 92, 112),
+    "tongue": (214, 108, 104), "brows": (176, 82, 34), "moustache": (186, 90, 38), "cap": (40, 92, 112),
     "cap_band": (28, 66, 84), "hair": (186, 90, 38), "collar": (238, 226, 200),
 }
 HEADER = """# facegen: a cartoon character, for blendshape transfer.

@@ -30,8 +30,8 @@ SLIT = 0.0032                              # neutral gap between the lips in the
 STIFF, TAUT = 30.0, 0.0                    # how far one step of the relaxation goes
 MIRROR = np.array([-1.0, 1.0, 1.0])
 
-COLUMNS, ROWS = 30, 23                     # rows 0 (neck) .. 22; the crown's pole closes the top
-EYE_HOLE, NOSE_HOLE, MOUTH_HOLE, EAR_HOLE = (2, 8, 14, 18), (-2, 2, 9, 13), (-4, 4, 6, 8), (10, 12, 11, 15)
+COLUMNS, ROWS = 30, 24                     # rows 0 (neck) .. 23; the crown's pole closes the top
+EYE_HOLE, NOSE_HOLE, MOUTH_HOLE, EAR_HOLE = (2, 8, 15, 19), (-2, 2, 10, 14), (-4, 4, 7, 9), (10, 12, 12, 16)
 
 
 # ---- the shape: distance functions, all of points (n, 3) ----
@@ -81,7 +81,7 @@ def face_shape(p: Array) -> Array:
 def shape(p: Array) -> Array:
     """Return the signed distance (about) of the whole but the ears."""
     nose = _ellipsoid(p, (0.0, -0.185, 0.95), (0.195, 0.165, 0.185))
-    nose = _join(nose, _pair(p, (0.15, -0.225, 0.87), (0.105, 0.095, 0.11)), 0.07)
+    nose = _join(nose, _pair(p, (0.15, -0.225, 0.87), (0.105, 0.095, 0.11)), 0.12)
     return _join(face_shape(p), nose, 0.05)
 
 
@@ -292,8 +292,8 @@ def _grid(skin: Skin) -> dict[tuple[int, int], int]:
         return (c + COLUMNS // 2) % COLUMNS - COLUMNS // 2
 
     around = np.radians([0, 6, 11, 17, 23, 29, 35, 41, 48, 58, 72, 90, 108, 128, 152, 180])
-    heights = np.interp(np.arange(ROWS), [0, 1, 2, 3, 4, 5, 6, 8, 9, 13, 14, 18, 19, 20, 22],
-                        [-1.25, -1.10, -1.0, -0.98, -0.93, -0.83, -0.7, -0.40, -0.34, -0.02, 0.0, 0.5, 0.6, 0.68, 0.93])
+    heights = np.interp(np.arange(ROWS), [0, 1, 2, 3, 4, 5, 6, 7, 9, 10, 14, 15, 19, 20, 21, 23],
+                        [-1.25, -1.07, -1.0, -0.985, -0.96, -0.91, -0.82, -0.7, -0.40, -0.34, -0.02, 0.0, 0.5, 0.6, 0.68, 0.93])
     grid: dict[tuple[int, int], int] = {}
     for r in range(ROWS):
         for c in columns:
@@ -316,6 +316,7 @@ def _grid(skin: Skin) -> dict[tuple[int, int], int]:
         skin.materials.append("skin")
     skin.rings["crown"] = [crown]
     skin.rings["neck"] = [grid[c, 0] for c in columns]
+    skin.rings["throat"] = [grid[c, 1] for c in columns]
     skin.rings["middle"] = [grid[0, r] for r in range(ROWS) if (0, r) in grid]
     for name, hole in (("eye_L", EYE_HOLE), ("eye_R", _mirrored_hole(EYE_HOLE)), ("nose", NOSE_HOLE),
                        ("mouth", MOUTH_HOLE), ("ear_L", EAR_HOLE), ("ear_R", _mirrored_hole(EAR_HOLE))):
@@ -341,7 +342,9 @@ def _set_loops(skin: Skin, grid: dict[tuple[int, int], int]) -> NDArray[np.bool_
     place("ear_L_0", ear)
     place("ear_R_0", _mirrored(ear))
     angle = 2 * np.pi * np.arange(-COLUMNS // 2, COLUMNS // 2) / COLUMNS
-    place("neck", np.stack([0.325 * np.sin(angle), np.full(COLUMNS, -1.25), -0.09 + 0.325 * np.cos(angle)], axis=1))
+    for name, high in (("neck", -1.25), ("throat", -1.09)):
+        ring = np.stack([0.31 * np.sin(angle), np.full(COLUMNS, high), -0.09 + 0.31 * np.cos(angle)], axis=1)
+        place(name, onto(ring))
     skin.points[skin.rings["crown"][0]] = onto(np.array([[0.0, 1.05, -0.1]]))[0]
     fixed[skin.rings["crown"]] = True
     return fixed
@@ -382,7 +385,7 @@ def _eyes(skin: Skin) -> None:
     full = EYE_RADIUS + LID
     near = lid_ring(11.0, full)
     between = 0.42 * orbit_ring() + 0.58 * near
-    rings = [("skin", on_lids(between, between)), ("skin", on_lids(near, near)), ("lid", lid_ring(4.0, full)),
+    rings = [("skin", on_lids(between, between)), ("skin", on_lids(near, near)), ("skin", lid_ring(4.0, full)),
              ("lid", lid_ring(0.3, EYE_RADIUS + 0.6 * LID)), ("lid", lid_ring(0.0, EYE_RADIUS + LID_GAP)),
              ("lid", lid_ring(9.0, EYE_RADIUS + LID_GAP))]
     for side in "LR":
@@ -402,14 +405,14 @@ def _mouth(skin: Skin) -> None:
              ("lips", mouth_ring(w, g, g, 0.022)),
              ("lips", mouth_ring(w - 0.004, 0.012, 0.012, -0.040)),
              ("mouth", mouth_ring(w + 0.004, 0.13, 0.14, -0.055)),
-             ("mouth", mouth_ring(w + 0.01, 0.17, 0.17, -0.25, flat=True)),
-             ("mouth", mouth_ring(w - 0.06, 0.15, 0.15, -0.50, flat=True))]
+             ("mouth", mouth_ring(w + 0.01, 0.17, 0.185, -0.25, flat=True)),
+             ("mouth", mouth_ring(w - 0.05, 0.15, 0.175, -0.50, flat=True))]
     outer = skin.rings["mouth_0"]
     for number, (material, ring) in enumerate(rings, 1):
         inner = skin.add(ring)
         skin.band(outer, inner, material)
         skin.rings[f"mouth_{number}"] = outer = inner
-    skin.rings["throat"] = skin.cap(outer, 8, 2, "mouth", np.array([0.0, 0.0, -0.06]))
+    skin.rings["gullet"] = skin.cap(outer, 8, 2, "mouth", np.array([0.0, 0.0, -0.06]))
 
 
 def _nose(skin: Skin) -> None:

@@ -207,14 +207,14 @@ def visor() -> Piece:
     for t in angle:
         reach = 0.12 + 0.88 * np.cos(t * 90.0 / 64.0) ** 0.75
         out = np.array([np.sin(t), 0.0, np.cos(t)])
-        root = np.array([0.765 * out[0], 0.675, -0.07 + 0.77 * out[2]])
+        root = np.array([0.77 * out[0], 0.675, -0.055 + 0.775 * out[2]])
         edge = root + reach * (0.13 * out + [0.0, -0.05, 0.24]) - [0.0, 0.06 * np.sin(t) ** 2, 0.0]
         middle = (root + edge) / 2 + [0.0, 0.03 * reach, 0.0]
         thick = np.array([0.0, 0.026, 0.0])
-        rings.append(np.array([root - out * 0.02 + thick, middle + thick, edge + 0.8 * thick, edge + 0.02 * reach * out,
-                               edge - 0.8 * thick, middle - thick, root - out * 0.02 - thick]))
-    piece.tube([_askew(ring) for ring in rings], "cap_band",
-               tips=(_askew([rings[0].mean(axis=0)])[0], _askew([rings[-1].mean(axis=0)])[0]))
+        ring = _askew([root + thick, middle + thick, edge + 0.8 * thick, edge + 0.02 * reach * out, edge - 0.8 * thick,
+                       middle - thick, root - thick])
+        rings.append(ring + _above(_askew([root]), 0.055) - _askew([root]))        # its root lies on the band
+    piece.tube(rings, "cap_band", tips=(rings[0].mean(axis=0), rings[-1].mean(axis=0)))
     return piece.outwards()
 
 
@@ -258,43 +258,45 @@ def collar() -> Piece:
 
 # ---- inside the mouth ----
 def teeth(row: str) -> Piece:
-    """Return a row of big teeth with its gum; the upper one has a gap in the middle."""
-    piece = Piece(f"teeth_{row}")
-    up = 1.0 if row == "upper" else -1.0
-    half, deep, ahead, edge = (0.21, 0.20, -0.130, MOUTH + 0.012) if row == "upper" else (0.18, 0.18, -0.175, MOUTH - 0.014)
-    z0 = float(front(np.array(0.0), np.array(MOUTH))) + ahead
-    bounds = np.array([0.0, 0.31, 0.56, 0.78, 1.0]) * 0.5 * np.pi                    # four teeth a side
-    stations = []                                                                   # (angle, how much of the tooth is there)
+    """Return a row of big teeth with its gum: four a side, with a gap between the upper two in the middle."""
+    upper = row == "upper"
+    up = 1.0 if upper else -1.0
+    # half width and depth of the arch, how far behind the face, height of the cutting edge
+    half, deep, behind, edge = (0.215, 0.20, 0.125, MOUTH - 0.022) if upper else (0.180, 0.165, 0.165, MOUTH - 0.040)
+    z0 = float(front(0.0, MOUTH)) - behind
+    bounds = 0.45 * np.pi * np.array([0.0, 0.30, 0.55, 0.78, 1.0])
+    side = [(0.0, 1.0)]                                              # (angle, how deep the notch there is, 0 on a tooth)
     for a, b in zip(bounds, bounds[1:], strict=False):
-        gap = 0.03
-        stations += [(a + gap, 0.86), (a + 0.35 * (b - a), 1.0), (b - gap, 0.9)]
-    angles = np.array([-t for t, _ in stations[::-1]] + [t for t, _ in stations])
-    full = np.array([f for _, f in stations[::-1]] + [f for _, f in stations])
+        side += [(a + 0.16 * (b - a), 0.0), (b - 0.16 * (b - a), 0.0), (b, 1.0)]
+    stations = [(-t, d) for t, d in side[:0:-1]] + side
     rings = []
-    for t, f in zip(angles, full, strict=True):
+    for t, notch in stations:
         out = np.array([np.sin(t), 0.0, np.cos(t)])
-        spot = np.array([half * np.sin(t), edge, z0 - deep * (1 - np.cos(t))])
-        tall, thick, gum = 0.075, 0.030 * f, 0.12 if row == "upper" else 0.10
-        rings.append(np.array([spot + up * np.array([0, (1 - f) * 0.10, 0]) + 0.2 * thick * out,
-                               spot + [0, up * 0.035, 0] + thick * out, spot + [0, up * tall, 0] + 0.8 * thick * out,
-                               spot + [0, up * gum, 0] + 0.2 * thick * out, spot + [0, up * gum, 0] - 0.035 * out,
-                               spot + [0, up * tall, 0] - 0.03 * out, spot + [0, up * 0.03, 0] - 0.02 * out]))
+        spot = np.array([half * np.sin(t), edge, z0 - deep * (1.0 - np.cos(t))])
+        bare = 0.055 if upper and t == 0.0 else 0.012                # how much of the edge a notch takes
+        thick = 0.032 - 0.010 * notch
+        tall = 0.125 if upper else 0.095
+        low = 0.030 + 0.7 * notch * bare
+        heights = (notch * bare, low, 0.68 * tall + 0.012 * notch, tall, tall, 0.68 * tall, low)
+        ahead = (0.25 * thick, thick, 0.85 * thick, 0.1 * thick, -0.035, -0.032, -0.022)
+        rings.append(np.array([spot + a * out + (0.0, up * h, 0.0) for h, a in zip(heights, ahead, strict=True)]))
+    piece = Piece(f"teeth_{row}")
     rows = piece.tube(rings, "teeth", tips=(rings[0].mean(axis=0), rings[-1].mean(axis=0)))
-    gum_of = {i for row_ in rows for i in row_[2:6]}
-    piece.materials = ["gums" if all(i in gum_of for i in face) and len(face) == 4 else "teeth" for face in piece.faces]
+    gum = {i for ring in rows for i in ring[2:6]}
+    piece.materials = ["gums" if gum.issuperset(face) else "teeth" for face in piece.faces]
     return piece.outwards()
 
 
 def tongue() -> Piece:
     """Return the tongue: flat, with a furrow."""
-    z0 = float(front(np.array(0.0), np.array(MOUTH))) - 0.23
+    z0 = float(front(np.array(0.0), np.array(MOUTH))) - 0.225
     t = np.linspace(0.0, 1.0, 8)
     c, s = _circle(10)
     rings = []
     for u in t:
-        wide = 0.118 * np.sqrt(np.sin(np.pi * (0.10 + 0.62 * u)))
-        high = 0.042 * np.sqrt(np.sin(np.pi * (0.10 + 0.62 * u)))
-        centre = np.array([0.0, MOUTH - 0.075 - 0.02 * u**2 + 0.012 * np.sin(np.pi * u), z0 - 0.22 * u])
+        wide = 0.125 * np.sqrt(np.sin(np.pi * (0.10 + 0.62 * u)))
+        high = 0.045 * np.sqrt(np.sin(np.pi * (0.10 + 0.62 * u)))
+        centre = np.array([0.0, MOUTH - 0.088 - 0.02 * u**2 + 0.012 * np.sin(np.pi * u), z0 - 0.22 * u])
         furrow = -0.014 * np.exp(-(c / 0.25) ** 2) * (s > 0)
         rings.append(centre + np.stack([wide * c, high * s + furrow, 0 * c], axis=1))
     piece = Piece("tongue")
