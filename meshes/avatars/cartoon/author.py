@@ -13,8 +13,11 @@ import sys
 from pathlib import Path
 
 import numpy as np
-from author_head import Array, Skin, face_shape, front, head_shape, head_skin, onto
+from author_head import Array, Skin, head_shape, head_skin, onto
 from author_pieces import Piece, brow_place, pieces
+
+Place = int | str | Array
+"""A vertex of the file, a place on a triangle in the landmarks file's words, or a point."""
 
 DECIMALS = 5
 COLOURS = {                                        # sRGB 0..255
@@ -32,7 +35,8 @@ mtllib cartoon.mtl
 MATERIALS = """# facegen: colours of the cartoon character. Source: own work of the facegen authors. Licence: MIT.
 """
 LANDMARKS = """# Landmarks of the cartoon character. Left and right are the subject's. A number is a vertex of cartoon.obj (0-based),
-# a point is in its own units and is snapped to the surface. Lids: the crest of the rim. Brows: on the skin under them.
+# a face one of its triangles, quads split from their first corner; a point is snapped to the surface. Lids: the crest
+# of the rim. Brows: on the skin under them.
 source: own work of the facegen authors, MIT
 mesh: cartoon.obj
 landmarks:
@@ -68,9 +72,9 @@ def format_materials() -> str:
                                for name, colour in COLOURS.items())
 
 
-def landmarks(skin: Skin, parts: list[Piece]) -> dict[str, int | Array]:
-    """Return name -> vertex of the file, or a point."""
-    found: dict[str, int | Array] = {}
+def landmarks(skin: Skin, parts: list[Piece]) -> dict[str, Place]:
+    """Return where each landmark is."""
+    found: dict[str, Place] = {}
 
     def ring(name: str, number: int) -> list[int]:
         return skin.rings[f"{name}_{number}"]
@@ -79,7 +83,7 @@ def landmarks(skin: Skin, parts: list[Piece]) -> dict[str, int | Array]:
         mirror = np.array([sign, 1.0, 1.0])
         for name, t in (("inner", 0.06), ("mid", 0.5), ("outer", 0.94)):
             x, y = brow_place(t, side)
-            found[f"brow_{name}_{side}"] = np.array([x, y, front(x, y, face_shape)]) * mirror
+            found[f"brow_{name}_{side}"] = _seen_at(skin, sign * x, y)
         margin = ring(f"eye_{side}", 4)
         of = (lambda k: k) if side == "L" else (lambda k: (10 - k) % 20)       # the right eye's rings are mirrored
         for name, k in (("inner", 10), ("outer", 0), ("upper", 5), ("lower", 15), ("upper_inner", 7),
@@ -99,17 +103,34 @@ def landmarks(skin: Skin, parts: list[Piece]) -> dict[str, int | Array]:
     found["nose_base"] = ring("nose", 0)[12]
     found["mouth_top"], found["mouth_bottom"] = ring("mouth", 2)[5], ring("mouth", 2)[15]
     found["mouth_inner_top"], found["mouth_inner_bottom"] = ring("mouth", 4)[5], ring("mouth", 4)[15]
-    found["chin"] = np.array([0.0, -0.80, front(0.0, -0.80)])
+    found["chin"] = _seen_at(skin, 0.0, -0.80)
     found["head_top"] = skin.rings["crown"][0]
     found["head_back"] = onto(np.array([[0.0, 0.15, -0.95]]), head_shape)[0]
     found["neck"] = onto(np.array([[0.0, -1.12, 0.24]]), head_shape)[0]
     return found
 
 
-def format_landmarks(found: dict[str, int | Array]) -> str:
+def _seen_at(skin: Skin, x: float, y: float) -> str:
+    """Return the foremost place of the skin's triangles at (x, y), as seen from ahead, in the landmarks file's words.
+
+    Triangles are counted as readers count them that split polygons into fans; the skin comes first.
+    """
+    triangles = [(face[0], face[i], face[i + 1]) for face in skin.faces for i in range(1, len(face) - 1)]
+    a, b, c = np.moveaxis(np.array(skin.points)[triangles], 1, 0)
+    u, v, w = (b - a)[:, :2], (c - a)[:, :2], np.array([x, y]) - a[:, :2]
+    area = u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]
+    with np.errstate(divide="ignore", invalid="ignore"):                        # a triangle seen edge-on
+        s, t = (w[:, 0] * v[:, 1] - w[:, 1] * v[:, 0]) / area, (u[:, 0] * w[:, 1] - u[:, 1] * w[:, 0]) / area
+    z = np.where((s >= 0) & (t >= 0) & (s + t <= 1), a[:, 2] + s * (b - a)[:, 2] + t * (c - a)[:, 2], -np.inf)
+    face = int(z.argmax())
+    s, t = np.round((s[face], t[face]), DECIMALS)
+    return f"{{face: {face}, barycentric: [{1 - s - t:.{DECIMALS}f}, {s:.{DECIMALS}f}, {t:.{DECIMALS}f}]}}"
+
+
+def format_landmarks(found: dict[str, Place]) -> str:
     """Return the landmarks file."""
-    lines = [f"  {name}: {place}" if isinstance(place, int)
-             else f"  {name}: [" + ", ".join(f"{c:.{DECIMALS}f}" for c in _rounded([place])[0]) + "]"
+    lines = [f"  {name}: " + (str(place) if isinstance(place, (int, str)) else
+                              "[" + ", ".join(f"{c:.{DECIMALS}f}" for c in _rounded(place)) + "]")
              for name, place in found.items()]
     return LANDMARKS + "\n".join(lines) + "\n"
 
