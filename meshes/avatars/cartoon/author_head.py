@@ -280,7 +280,18 @@ def head_skin() -> Skin:
     _nose(skin)
     _ears(skin)
     _relax(skin, grid, np.flatnonzero(~fixed), loops)
+    skin.faces = [_split_well(face, np.array(skin.points)[list(face)]) for face in skin.faces]
     return skin
+
+
+def _split_well(face: tuple[int, ...], corners: Array) -> tuple[int, ...]:
+    """Return a quad with the first corner from which a reader should split it: along its shorter diagonal, and alike on
+    both sides of the face."""
+    if len(face) != 4:
+        return face
+    one, other = np.linalg.norm(corners[2] - corners[0]), np.linalg.norm(corners[3] - corners[1])
+    turned = one > other if abs(one - other) > 1e-6 else corners[:, 0].sum() < 0
+    return face[1:] + face[:1] if turned else face
 
 
 def _grid(skin: Skin) -> dict[tuple[int, int], int]:
