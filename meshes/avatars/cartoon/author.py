@@ -3,8 +3,8 @@
     python meshes/avatars/cartoon/author.py [FOLDER]
 
 writes ``cartoon.obj``, ``cartoon.mtl`` and ``landmarks.yaml`` beside this script. Everything is generated from the numbers
-in author_head.py (the skin) and author_pieces.py (the rest). The head is two units high; +x subject's left, +y up, +z
-forward.
+in head.py (the shape), rings.py and skin.py (the skin), features.py and worn.py (the rest). The head is two units high; +x
+subject's left, +y up, +z forward.
 """
 
 from __future__ import annotations
@@ -13,8 +13,11 @@ import sys
 from pathlib import Path
 
 import numpy as np
-from author_head import Array, Skin, head_shape, head_skin, onto
-from author_pieces import Piece, brow_place, pieces
+from features import brow, brow_place, eye, moustache, teeth, tongue
+from head import Array, head_shape, onto
+from piece import Piece
+from skin import Skin, head_skin
+from worn import button, cap, collar, hair, visor
 
 Place = int | str | Array
 """A vertex of the file, a place on a triangle in the landmarks file's words, or a point."""
@@ -46,7 +49,8 @@ landmarks:
 def everything() -> tuple[Skin, list[Piece]]:
     """Return the skin, and all pieces in the file's order: the skin is the first."""
     skin = head_skin()
-    return skin, [Piece("skin", skin.points, skin.faces, skin.materials), *pieces()]
+    return skin, [skin, eye("L"), eye("R"), teeth("upper"), teeth("lower"), tongue(), brow("L"), brow("R"), moustache(),
+                  cap(), visor(), button(), hair(), collar()]
 
 
 def format_pieces(parts: list[Piece]) -> str:
@@ -89,8 +93,8 @@ def landmarks(skin: Skin, parts: list[Piece]) -> dict[str, Place]:
         for name, k in (("inner", 10), ("outer", 0), ("upper", 5), ("lower", 15), ("upper_inner", 7),
                         ("upper_outer", 3), ("lower_inner", 13), ("lower_outer", 17)):
             found[f"eye_{name}_{side}"] = margin[of(k)]
-        before = sum(len(part.points) for part in parts[:[part.name for part in parts].index(f"eye_{side}")])
-        found[f"eye_center_{side}"] = before + parts[[part.name for part in parts].index(f"eye_{side}")].front
+        number = [part.name for part in parts].index(f"eye_{side}")
+        found[f"eye_center_{side}"] = sum(len(part.points) for part in parts[:number]) + parts[number].front
         found[f"nose_wing_{side}"] = ring("nose", 1)[15 if side == "L" else 9]
         found[f"mouth_corner_{side}"] = ring("mouth", 4)[0 if side == "L" else 10]
         found[f"mouth_upper_{side}"] = ring("mouth", 2)[3 if side == "L" else 7]
@@ -142,9 +146,9 @@ def _rounded(points) -> Array:
 def main(folder: Path) -> None:
     """Write the three files."""
     skin, parts = everything()
-    (folder / "cartoon.obj").write_text(format_pieces(parts), encoding="utf-8")
-    (folder / "cartoon.mtl").write_text(format_materials(), encoding="utf-8")
-    (folder / "landmarks.yaml").write_text(format_landmarks(landmarks(skin, parts)), encoding="utf-8")
+    for name, text in (("cartoon.obj", format_pieces(parts)), ("cartoon.mtl", format_materials()),
+                       ("landmarks.yaml", format_landmarks(landmarks(skin, parts)))):
+        (folder / name).write_text(text, encoding="utf-8", newline="\n")
 
 
 if __name__ == "__main__":
