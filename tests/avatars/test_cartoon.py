@@ -135,7 +135,8 @@ def test_the_lid_margin_lies_close_before_the_eyeball(mesh, marks, side):
     centre = (ball.min(axis=0) + ball.max(axis=0)) / 2
     radius = np.linalg.norm(points[f"eye_center_{side}"] - centre)
     margin = [points[f"eye_{name}_{side}"]
-              for name in ("inner", "outer", "upper", "lower", "upper_inner", "upper_outer", "lower_inner", "lower_outer")]
+              for name in ("inner", "outer", "upper", "lower", "upper_inner", "upper_outer", "lower_inner",
+                           "lower_outer")]
     gaps = np.linalg.norm(np.array(margin) - centre, axis=1) - radius
     assert gaps.min() > 0
     assert gaps.max() < 0.02 * HEIGHT

@@ -28,7 +28,7 @@ def cap() -> Piece:
     n = 32
     c, s = turns(n)                                         # s > 0 is the front
     # (height, half width, half length, shift forwards): inside of the band, band, crown
-    rows = [(0.72, 0.66, 0.66, -0.07), (0.635, 0.725, 0.73, -0.07), (0.625, 0.77, 0.775, -0.07), (0.72, 0.775, 0.78, -0.07),
+    rows = [(0.76, 0.63, 0.63, -0.07), (0.635, 0.725, 0.73, -0.07), (0.625, 0.77, 0.775, -0.07), (0.72, 0.775, 0.78, -0.07),
             (0.755, 0.87, 0.88, -0.06), (0.85, 0.955, 0.99, -0.05), (0.97, 0.91, 0.94, -0.06), (1.07, 0.71, 0.74, -0.08),
             (1.12, 0.42, 0.44, -0.10), (1.14, 0.15, 0.155, -0.10)]
     rings = []
@@ -83,8 +83,8 @@ def hair() -> Piece:
     edge = edge - 0.06 * (np.arange(len(half)) % 2) * (half > np.radians(110))
     edge = np.concatenate([edge, edge[-2::-1]])
     rows = []
-    for u, lift in ((0.0, -0.012), (0.05, 0.035), (0.35, 0.06), (0.70, 0.06), (1.0, 0.045)):
-        y = edge + u * (0.68 - edge)
+    for u, lift in ((0.0, -0.012), (0.05, 0.035), (0.35, 0.06), (0.70, 0.06), (1.0, 0.035)):
+        y = edge + u * (0.78 - 0.12 * np.sin(around) - edge)               # up under the cap, which is askew
         start = np.stack([0.7 * np.sin(around), y, -0.08 + 0.7 * np.cos(around)], axis=1)
         lift = np.where(np.abs(around - np.pi) <= np.pi - half[1], lift, -0.012)   # ends in the skin
         rows.append(piece.add(above(start, lift)))
