@@ -29,17 +29,20 @@ if TYPE_CHECKING:
     from facegen.facs.expressions import Resolution, presets, resolve
     from facegen.facs.notation import canonical, parse
     from facegen.facs.tables import load_expressions, load_person, load_units
+    from facegen.fileio.avatar import AvatarFile, load_avatar, save_avatar
     from facegen.fileio.images import contact_sheet, save_image
     from facegen.fileio.video import save_video
     from facegen.geometry.mesh import Mesh
     from facegen.jobs.batch import run_batch
     from facegen.jobs.frames import save_clip, save_turn
     from facegen.render import Renderer, Wireframe, render, render_passes, save_passes
+    from facegen.transfer.rig import avatar_names, rig
 
 __version__ = "0.1.0"
 
 __all__ = [
     "AvatarFace",
+    "AvatarFile",
     "Clip",
     "Controls",
     "Conversion",
@@ -56,10 +59,12 @@ __all__ = [
     "Resolution",
     "TableError",
     "Wireframe",
+    "avatar_names",
     "canonical",
     "contact_sheet",
     "convert",
     "face_names",
+    "load_avatar",
     "load_clip",
     "load_deformation",
     "load_expressions",
@@ -73,7 +78,9 @@ __all__ = [
     "render",
     "render_passes",
     "resolve",
+    "rig",
     "run_batch",
+    "save_avatar",
     "save_clip",
     "save_image",
     "save_passes",
@@ -96,6 +103,7 @@ _HOMES = {
     "facegen.facs.expressions": ("Resolution", "presets", "resolve"),
     "facegen.facs.notation": ("canonical", "parse"),
     "facegen.facs.tables": ("load_expressions", "load_person", "load_units"),
+    "facegen.fileio.avatar": ("AvatarFile", "load_avatar", "save_avatar"),
     "facegen.fileio.images": ("contact_sheet", "save_image"),
     "facegen.fileio.video": ("save_video",),
     "facegen.geometry.mesh": ("Mesh",),
@@ -105,6 +113,7 @@ _HOMES = {
     "facegen.render.passes": ("render_passes",),
     "facegen.render.passfiles": ("save_passes",),
     "facegen.render.render": ("Renderer",),
+    "facegen.transfer.rig": ("avatar_names", "rig"),
     "facegen": ("render",),                 # the package itself: calling it draws
 }
 _HOME = {name: module for module, names in _HOMES.items() for name in names}
