@@ -7,7 +7,7 @@ Units and expressions come from the tables of action units and expressions; ARKi
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache
 from pathlib import Path
@@ -78,7 +78,7 @@ def shape_set(name: str, person: str | Path | Person | None = None) -> dict[str,
     if name not in (*SETS, "all"):
         raise InputError(f"set: expected {', '.join(SETS)} or all, got {name!r}{nearest(str(name), (*SETS, 'all'))}")
     if name == "all":
-        return _all(person)
+        return shape_sets(SETS, person)
     if name == "expressions":
         return _expressions(person)
     return dict(_units() if name == "units" else _vocabularies()[name])
@@ -90,13 +90,20 @@ def is_head(member: str) -> bool:
     return member in table.catalogue.atoms and table.catalogue.unit_of(member).region == "head"
 
 
-def _all(person: str | Path | Person | None) -> dict[str, Recipe]:
+def shape_sets(names: Sequence[str], person: str | Path | Person | None = None) -> dict[str, Recipe]:
+    """Return the recipes of several sets together, expressions last: one whose name another shape has gets `CLASH`.
+
+    names: as `shape_set` takes them, one or more; InputError otherwise.
+    """
+    if not names:
+        raise InputError(f"sets: expected one or more of {', '.join(SETS)}, all, got none")
     shapes: dict[str, Recipe] = {}
-    for name in SETS:
+    for name in sorted(dict.fromkeys(names), key=("expressions", "all").__contains__):
         if name != "expressions":
-            shapes |= shape_set(name)
-    for name, recipe in _expressions(person).items():
-        shapes[CLASH + name if name in shapes else name] = recipe
+            shapes |= shape_set(name, person)
+    if "expressions" in names and "all" not in names:
+        for name, recipe in _expressions(person).items():
+            shapes[CLASH + name if name in shapes else name] = recipe
     return shapes
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import fields
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,9 +39,12 @@ def shape_motion(face: Face, recipes: Mapping[str, Recipe], *, detail: int = 2) 
 
 def posed(face: Face, several: Sequence[Sequence[Deformation]], *, detail: int) -> NDArray[np.float64]:
     """Return the vertices (k, n, 3), mm, under k sums of deformations."""
-    found = [face.controls(*one, strict=False) for one in several]
-    if not found:
+    if not several:
         return np.empty((0, *face.mesh(detail).vertices.shape))
-    together = Controls(*(np.stack([getattr(one, field) for one in found])
-                          for field in ("vectors", "jaw", "lids", "eyes", "head", "folds")))
-    return face.pose_controls(together, detail=detail)
+    return face.pose_controls(joined(face, several), detail=detail)
+
+
+def joined(face: Face, several: Sequence[Sequence[Deformation]]) -> Controls:
+    """Return the deformer's input for k sums of deformations, with a leading axis of k; at least one."""
+    found = [face.controls(*one, strict=False) for one in several]
+    return Controls(*(np.stack([getattr(one, field.name) for one in found]) for field in fields(Controls)))

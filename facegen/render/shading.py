@@ -12,6 +12,8 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
+from facegen.fileio.srgb import to_linear
+from facegen.fileio.srgb import to_srgb as encoded
 from facegen.geometry.camera import Camera
 from facegen.geometry.mesh import Mesh
 from facegen.geometry.normals import face_normals, vertex_normals
@@ -95,10 +97,7 @@ def material_rows(mesh: Mesh, scene: Scene) -> NDArray[np.float32]:
 
 def vertex_albedo(mesh: Mesh) -> NDArray[np.float32] | None:
     """Return the linear albedo (n, 3) of a mesh's vertices, or None if it leaves that to the materials."""
-    if mesh.colours is None:
-        return None
-    v = mesh.colours / np.float32(255)
-    return np.where(v <= 0.04045, v / 12.92, ((v + 0.055) / 1.055) ** 2.4).astype(np.float32)
+    return None if mesh.colours is None else to_linear(mesh.colours).astype(np.float32)
 
 
 def light_directions(scene: Scene) -> NDArray[np.float64]:
@@ -173,7 +172,7 @@ def to_srgb(linear: NDArray) -> NDArray[np.uint8]:
 
 def from_srgb(colour: tuple[float, float, float]) -> NDArray[np.float32]:
     """Return the linear value of an sRGB colour 0..255, (3,)."""
-    return np.array([_linear(c) for c in colour], np.float32)
+    return to_linear(colour).astype(np.float32)
 
 
 def _barycentrics(s: Surface, ids: NDArray, x: NDArray, y: NDArray) -> NDArray[np.float32]:
@@ -218,15 +217,7 @@ def _tone(linear: NDArray[np.float32]) -> NDArray[np.float32]:
     return np.minimum(linear, np.float32(SHOULDER)) + above * room / (above + room)
 
 
-def _linear(value: float) -> float:
-    """Return linear light 0..1 of an sRGB value 0..255 (IEC 61966-2-1)."""
-    v = value / 255
-    return v / 12.92 if v <= 0.04045 else ((v + 0.055) / 1.055) ** 2.4
-
-
 @cache
 def srgb_table() -> NDArray[np.uint8]:
     """Return the sRGB bytes of 4096 linear values 0..1."""
-    linear = np.arange(4096) / 4095
-    encoded = np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
-    return np.rint(encoded * 255).astype(np.uint8)
+    return np.rint(encoded(np.arange(4096) / 4095)).astype(np.uint8)

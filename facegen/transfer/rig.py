@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, lru_cache
 from pathlib import Path
 
 import numpy as np
 
-from facegen.blendshapes.recipes import SETS, Recipe, shape_set
+from facegen.blendshapes.recipes import Recipe, shape_sets
 from facegen.data import meshes_dir
 from facegen.errors import FileError, InputError, nearest
 from facegen.face.face import load_face
@@ -56,7 +56,7 @@ def rig(avatar: str | Path, output: str | Path, *, landmarks: str | Path | None 
 
     avatar: the path of a .obj, .glb, .gltf, .vrm, .ply or .stl file, or a shipped avatar's name. output: .glb (or
     .gltf, .vrm), .npz, or a folder for a sequence of OBJ files. landmarks: their file; a shipped avatar has its own.
-    sets: vocabularies, see `shape_set`. person: whose habits override expressions. method, opening, pieces: as in
+    sets: vocabularies, see `shape_sets`. person: whose habits override expressions. method, opening, pieces: as in
     `transfer`. normals, quantise: as in `save_avatar`. Raises InputError and its children; nothing is written then. ::
 
         facegen.rig("cat.obj", "cat.glb", landmarks="cat.yaml")
@@ -71,7 +71,7 @@ def rig(avatar: str | Path, output: str | Path, *, landmarks: str | Path | None 
     if marks is None:
         raise InputError(f"landmarks: expected the file of the avatar's landmarks, got none; write one with the places "
                          f"of eyes, brows, nose, mouth and chin on {path.name} (docs/landmarks.md lists the names)")
-    recipes = wanted_shapes(sets, person)
+    recipes = shape_sets(sets, person)
     source = load_avatar(path)
     check_output(source, output, recipes)
     places = load_landmarks(marks, source.mesh, mesh_name=path.name, digest=source.digest)
@@ -86,20 +86,7 @@ def rig(avatar: str | Path, output: str | Path, *, landmarks: str | Path | None 
     return Rigged(written, tuple(shapes), warnings, found)
 
 
-def wanted_shapes(sets: Sequence[str], person: str | Path | None = None) -> dict[str, Recipe]:
-    """Return the recipes of one set or several, by the names that the shapes get."""
-    if not sets:
-        raise InputError(f"sets: expected one or more of {', '.join(SETS)}, all, got none")
-    recipes: dict[str, Recipe] = {}
-    for name in sets:
-        for shape, recipe in shape_set(name, person).items():
-            if shape in recipes and recipes[shape] != recipe:
-                shape = f"{recipe.set or name}_{shape}"
-            recipes[shape] = recipe
-    return recipes
-
-
-@cache
+@lru_cache(maxsize=1)         # many avatars with the same shapes; a template is tens of megabytes
 def _template(recipes: tuple[tuple[str, Recipe], ...]) -> Template:
     return template_of(load_face(), dict(recipes))
 

@@ -59,11 +59,11 @@ def transfer(mesh: Mesh, landmarks: Landmarks, template: Template, *, method: st
         raise InputError(f"method: expected {', '.join(METHODS)}, got {method!r}{nearest(str(method), METHODS)}")
     if not _LEAST_OPENING <= opening <= _MOST_OPENING:
         raise InputError(f"opening: expected a factor of {_LEAST_OPENING} to {_MOST_OPENING}, got {opening!r}")
-    points = landmarks.points(mesh.vertices)
-    frame = align(points, template.landmarks)
-    vertices, own = weld(frame.apply(mesh.vertices), mesh.faces)
+    frame = align(landmarks.points(mesh.vertices), template.landmarks)
+    turned = frame.apply(mesh.vertices)
+    places = landmarks.points(turned)
+    vertices, own = weld(turned, mesh.faces)
     faces = own[mesh.faces]
-    places = landmarks.points(frame.apply(mesh.vertices))
     found = find_pieces(vertices, faces, places, names=face_names(mesh), explicit=pieces)
     rows, surface = _skin_surface(vertices, faces, found)
     skin = lay_skin(template, surface, _skin_places(landmarks, own, rows, surface, places, template), opening=opening)

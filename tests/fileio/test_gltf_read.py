@@ -16,15 +16,6 @@ from facegen.fileio.avatar import load_avatar
 VERTICES, FACES = ball()
 
 
-@pytest.fixture
-def load(tmp_path):
-    """A function that loads a glTF file of a kind's name or of JSON and data."""
-    def load(kind, data=None, name="a.glb"):
-        found, data = gltfs.KINDS[kind]() if isinstance(kind, str) else (kind, data)
-        return load_avatar(gltfs.write(tmp_path / name, found, data))
-    return load
-
-
 def volume(mesh):
     """Return six times the volume inside: positive if the triangles are seen counter-clockwise from outside."""
     a, b, c = mesh.vertices[mesh.faces].transpose(1, 0, 2)

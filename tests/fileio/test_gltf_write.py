@@ -19,15 +19,6 @@ VERTICES, FACES = ball()
 KINDS = list(gltfs.KINDS)
 
 
-@pytest.fixture
-def load(tmp_path):
-    """A function that loads a glTF file of a kind's name or of JSON and data."""
-    def load(kind, data=None, name="a.glb"):
-        found, data = gltfs.KINDS[kind]() if isinstance(kind, str) else (kind, data)
-        return load_avatar(gltfs.write(tmp_path / name, found, data))
-    return load
-
-
 def some_shapes(vertices, seed=0):
     """Return shapes (n, 3): one local, one of all vertices, one that moves nothing."""
     rng = np.random.default_rng(seed)
