@@ -57,6 +57,7 @@ class Correspondence:
     def __init__(self, template: Surface, sides: NDArray) -> None:
         self.template = template
         self._search = ClosestPoints(template)
+        self.sides = sides
         self._sides = sides[template.faces].mean(axis=1)
         _edges, of_side = template.edges
         border = template.border_edges

@@ -7,7 +7,7 @@ pieces as what they are, and back.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,8 +19,10 @@ from facegen.geometry.mesh import Mesh
 from facegen.geometry.operators import Surface
 from facegen.transfer.alignment import Similarity, align
 from facegen.transfer.baselines import PaperWeights
+from facegen.transfer.closing import closing
 from facegen.transfer.keep_apart import Contact, keep_apart
 from facegen.transfer.landmarks import Landmarks
+from facegen.transfer.margins import LIDS, LIPS
 from facegen.transfer.piece_motion import PieceMotion, RigidMotions
 from facegen.transfer.pieces import Piece, face_names, find_pieces
 from facegen.transfer.skin import METHODS, Skin, lay_skin
@@ -72,9 +74,14 @@ def transfer(mesh: Mesh, landmarks: Landmarks, template: Template, *, method: st
     contacts: Mapping[str, Contact] = {}
     if method == "landmarks":
         moved = PieceMotion(found, vertices, faces, places)
+        slits = [closing(skin, lids, moved.eyes.get(side), vertices[moved.rows(f"eye_{side}")])
+                 for lids, side in zip(LIDS, "LR", strict=True)]
+        slits = [slit for slit in [*slits, closing(skin, LIPS)] if slit is not None]
+        _on_skin(motion, rows, [slit.close for slit in slits])
         jaw = None if skin.jaw is None else RigidMotions.of(lambda at: skin.jaw.movement(at, template.jaw))
         motion = moved.move(motion, jaw, template.gaze)
         motion, contacts = keep_apart(moved, motion, template.gaze)
+        _on_skin(motion, rows, [slit.seal for slit in slits])
     result = motion.copy()
     for row, other in enumerate(template.minus):
         if other >= 0:
@@ -82,6 +89,14 @@ def transfer(mesh: Mesh, landmarks: Landmarks, template: Template, *, method: st
     back = frame.inverse()
     shapes = {name: back.apply_vectors(result[row][own]) for row, name in enumerate(template.names)}
     return Transferred(shapes, frame, skin, found, contacts)
+
+
+def _on_skin(motion: NDArray, rows: NDArray, steps: Sequence[Callable[[NDArray], None]]) -> None:
+    """Apply steps that change the skin's displacements (k, rows, 3) in place."""
+    skin = motion[:, rows]
+    for step in steps:
+        step(skin)
+    motion[:, rows] = skin
 
 
 def _skin_surface(vertices: NDArray, faces: NDArray, pieces: tuple[Piece, ...]) -> tuple[NDArray, Surface]:

@@ -1,0 +1,167 @@
+"""The two edges of a slit: the margins of the lids, the lines where lips touch.
+
+A margin runs along edges of the mesh from corner to corner through its landmarks. Between landmarks it keeps to the
+template's margin, on which the avatar's skin was registered: the shortest way alone would cut across the lid.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+from scipy.interpolate import CubicSpline
+from scipy.sparse.csgraph import dijkstra
+from scipy.spatial import cKDTree
+
+from facegen.geometry.operators import Surface
+
+Array = NDArray[np.float64]
+Places = Mapping[str, tuple[NDArray, NDArray]]
+
+SAMPLES = 33
+"""Places along a slit where its edges are compared."""
+
+# Millimetres on the template: this far beside the guide a way is twice as long.
+_NARROW = 0.7
+# A way on the wrong side of the slit is so many times as long.
+_WRONG_SIDE = 20.0
+# A guide is sampled at so many places.
+_GUIDE = 200
+
+
+@dataclass(frozen=True)
+class Slit:
+    """Landmarks of a slit: its two ``corners``, those along its ``upper`` and ``lower`` edge in the same order, and the
+    column of `side_fields` that knows its sides."""
+
+    name: str
+    corners: tuple[str, str]
+    upper: tuple[str, ...]
+    lower: tuple[str, ...]
+    side: int
+
+
+LIDS = tuple(Slit(f"eye_{s}", (f"eye_inner_{s}", f"eye_outer_{s}"),
+                  *(tuple(f"eye_{edge}{at}_{s}" for at in ("_inner", "", "_outer")) for edge in ("upper", "lower")),
+                  side) for side, s in ((1, "L"), (2, "R")))
+LIPS = Slit("mouth", ("mouth_corner_R", "mouth_corner_L"), ("mouth_inner_top",), ("mouth_inner_bottom",), 0)
+
+
+@dataclass(frozen=True, eq=False)
+class Margins:
+    """``upper``, ``lower``: (SAMPLES, n) weights of the vertices that place facing places of the two edges, corner to
+    corner; ``rows``: the vertices on one of them, ``at`` their position along the slit, 0 to 1, and ``is_upper``;
+    ``corners``: vertices of both. ``line`` (2, g, 3): the edges as curves, mm."""
+
+    upper: sparse.csr_array
+    lower: sparse.csr_array
+    rows: NDArray[np.int64]
+    at: Array
+    is_upper: NDArray[np.bool_]
+    corners: NDArray[np.int64]
+    line: Array
+
+
+def find_margins(surface: Surface, slit: Slit, places: Places, sides: Array, *, shape: Array | None = None,
+                 guide: Array | None = None) -> Margins | None:
+    """Return the edges of a slit of the skin, or None where it has none: corners, or an edge's landmarks, are missing,
+    or both edges are one, as on a face with painted lids.
+
+    places: landmark -> vertices (3,) and weights (3,). sides: `side_fields`. guide (2, g, 3): curves for the edges, in
+    the coordinates ``shape`` (n, 3); without, smooth curves through the landmarks, in the surface's own.
+    """
+    at = surface.vertices if shape is None else shape
+    sign = sides[:, slit.side]
+    paths, lines = [], []
+    for edge, (names, up) in enumerate(((slit.upper, 1.0), (slit.lower, -1.0))):
+        stops = _stops(slit, names, places)
+        if stops is None:
+            return None
+        line = _curve(at[stops]) if guide is None else guide[edge]
+        path = _way(surface, at, stops, line, up * sign)
+        if path is None:
+            return None
+        paths.append(path)
+        lines.append(_resampled(at[path], _GUIDE))
+    both = np.intersect1d(*paths)
+    if any(len(np.setdiff1d(path, both)) == 0 for path in paths):
+        return None
+    n = len(surface.vertices)
+    along = [_along(surface.vertices[path]) for path in paths]
+    upper, lower = (_sampler(path, t, n) for path, t in zip(paths, along, strict=True))
+    own = [~np.isin(path, both) for path in paths]
+    rows = np.concatenate([path[keep] for path, keep in zip(paths, own, strict=True)])
+    where = np.concatenate([t[keep] for t, keep in zip(along, own, strict=True)])
+    is_upper = np.arange(len(rows)) < own[0].sum()
+    return Margins(upper, lower, rows, where, is_upper, both, np.array(lines))
+
+
+def _stops(slit: Slit, names: tuple[str, ...], places: Places) -> NDArray | None:
+    """Return the vertices that the landmarks of an edge lie on, corners first and last."""
+    wanted = [slit.corners[0], *(name for name in names if name in places), slit.corners[1]]
+    if len(wanted) < 3 or any(name not in places for name in wanted):
+        return None
+    stops = np.array([places[name][0][np.argmax(places[name][1])] for name in wanted])
+    return stops if len(np.unique(stops)) == len(stops) else None
+
+
+def _curve(stops: Array) -> Array:
+    """Return a smooth curve (g, 3) through some places (s, 3)."""
+    steps = np.linalg.norm(np.diff(stops, axis=0), axis=1)
+    t = np.concatenate([[0.0], np.cumsum(np.maximum(steps, 1e-9))])
+    return CubicSpline(t, stops)(np.linspace(0, t[-1], _GUIDE))
+
+
+def _way(surface: Surface, at: Array, stops: NDArray, line: Array, side: Array) -> NDArray | None:
+    """Return the vertices of the cheapest way along edges from stop to stop, or None where there is none."""
+    edges, _ = surface.edges
+    middle = at[edges].mean(axis=1)
+    off, _ = cKDTree(line).query(middle)
+    length = np.linalg.norm(at[edges[:, 0]] - at[edges[:, 1]], axis=1) + 1e-6
+    length = length * (1 + (off / _NARROW) ** 2) * np.where(side[edges].min(axis=1) < 0, _WRONG_SIDE, 1.0)
+    n = len(at)
+    graph = sparse.csr_array((length, (edges[:, 0], edges[:, 1])), shape=(n, n))
+    _, before = dijkstra(graph, directed=False, indices=stops[:-1], return_predecessors=True)
+    path = [int(stops[0])]
+    for leg, goal in enumerate(stops[1:]):
+        back = [int(goal)]
+        while back[-1] != stops[leg]:
+            step = int(before[leg, back[-1]])
+            if step < 0:
+                return None
+            back.append(step)
+        path += back[-2::-1]
+    _, first = np.unique(path, return_index=True)           # a way that comes back to itself goes round nothing
+    return np.array(path)[np.sort(first)]
+
+
+def _along(path: Array) -> Array:
+    """Return where the places (p, 3) of an edge lie along the slit, from 0 at its first corner to 1: half by the chord
+    between the corners, which faces the other edge, half by the way, which never stands still."""
+    chord = path[-1] - path[0]
+    by_chord = np.maximum.accumulate(np.clip((path - path[0]) @ chord / max(float(chord @ chord), 1e-300), 0.0, 1.0))
+    steps = np.linalg.norm(np.diff(path, axis=0), axis=1)
+    by_way = np.concatenate([[0.0], np.cumsum(steps)]) / max(float(steps.sum()), 1e-300)
+    t = 0.5 * by_chord + 0.5 * by_way
+    t[0], t[-1] = 0.0, 1.0
+    return t
+
+
+def _resampled(path: Array, count: int) -> Array:
+    steps = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(path, axis=0), axis=1))])
+    wanted = np.linspace(0, steps[-1], count)
+    return np.stack([np.interp(wanted, steps, axis) for axis in path.T], axis=1)
+
+
+def _sampler(path: NDArray, t: Array, n: int) -> sparse.csr_array:
+    """Return the weights (SAMPLES, n) that place evenly spread places of the edge."""
+    wanted = np.linspace(0, 1, SAMPLES)
+    right = np.clip(np.searchsorted(t, wanted, side="right"), 1, len(t) - 1)
+    left = right - 1
+    share = np.clip((wanted - t[left]) / np.maximum(t[right] - t[left], 1e-12), 0.0, 1.0)
+    rows = np.repeat(np.arange(SAMPLES), 2)
+    columns = np.stack([path[left], path[right]], axis=1).ravel()
+    return sparse.csr_array((np.stack([1 - share, share], axis=1).ravel(), (rows, columns)), shape=(SAMPLES, n))

@@ -1,0 +1,86 @@
+"""Lids meet over the eye and lips meet over the teeth, on every avatar that ships."""
+
+import numpy as np
+import pytest
+from scipy.spatial import cKDTree
+
+from facegen.face.face import load_face
+from facegen.fileio.avatar import load_avatar
+from facegen.render import render_passes
+from facegen.transfer.closing import closing
+from facegen.transfer.margins import LIDS, LIPS, find_margins
+from facegen.transfer.rig import avatar_names, rig
+from facegen.transfer.skin import lay_skin
+
+# Of the eye that a camera sees at rest: what it may see of it when the lids are shut.
+SEEN = {"human": 0.05}
+OTHERS = 0.15
+
+
+@pytest.fixture(scope="module", params=avatar_names())
+def rigged(request, tmp_path_factory):
+    return rig(request.param, tmp_path_factory.mktemp("closing") / f"{request.param}.glb", sets=["arkit", "units"])
+
+
+@pytest.fixture(scope="module")
+def skin_shapes(rigged):
+    """The shapes on the skin's own vertices, mm."""
+    avatar, found = load_avatar(rigged.path), rigged.found
+    rows = cKDTree(found.frame.apply(avatar.mesh.vertices)).query(found.skin.surface.vertices)[1]
+    return {name: found.frame.apply_vectors(shape[rows]) for name, shape in avatar.shapes.items()}
+
+
+def gaps(rigged, slit, moved):
+    """Distances of facing places of a slit's edges, mm."""
+    skin = rigged.found.skin
+    own = find_margins(skin.template.surface, slit, skin.template.places, skin.correspondence.sides)
+    edges = find_margins(skin.surface, slit, skin.places, skin.sides, shape=skin.registered, guide=own.line)
+    places = skin.surface.vertices + moved
+    return np.linalg.norm(edges.upper @ places - edges.lower @ places, axis=1)
+
+
+@pytest.mark.parametrize(("slit", "name"), [(LIDS[0], "eyeBlinkLeft"), (LIDS[1], "eyeBlinkRight")])
+def test_a_blink_closes_the_lids(rigged, skin_shapes, slit, name):
+    rest = gaps(rigged, slit, 0.0)
+    assert rest.max() > 3.0
+    assert gaps(rigged, slit, skin_shapes[name]).mean() < 0.05 * rest.mean()
+    half = gaps(rigged, slit, 0.5 * skin_shapes[name]).mean() / rest.mean()
+    assert 0.4 < half < 0.6
+
+
+def test_a_camera_sees_no_eye_through_shut_lids(rigged):
+    face = load_face(rigged.path)
+    eyes = [i + 1 for i, name in enumerate(face.mesh().parts) if name.startswith("eye")]
+
+    def seen(pose):
+        return sum(np.isin(render_passes(face, pose, passes=["part"], size=256, view=view)["part"], eyes).sum()
+                   for view in ((0, 0), (25, 0), (-25, 0)))
+
+    name = rigged.path.stem
+    assert seen({}) > 100
+    assert seen("43E") <= SEEN.get(name, OTHERS) * seen({})
+
+
+def test_mouth_close_takes_back_what_jaw_open_parted(rigged, skin_shapes):
+    rest, opened = gaps(rigged, LIPS, 0.0), gaps(rigged, LIPS, skin_shapes["jawOpen"])
+    closed = gaps(rigged, LIPS, skin_shapes["jawOpen"] + skin_shapes["mouthClose"])
+    assert opened.max() > 10 > 10 * (closed - rest).max()
+
+
+def test_the_template_needs_no_closing(template):
+    """What it adds to a faithful copy of the template is nothing."""
+    skin = lay_skin(template, template.surface, template.places)
+    motion = template.motion.copy()
+    for slit in (*LIDS, LIPS):
+        found = closing(skin, slit)
+        found.close(motion)
+        found.seal(motion)
+    assert np.abs(motion - template.motion).max() < 1e-6 * template.height
+
+
+def test_a_face_without_landmarks_of_a_slit_has_none(template):
+    places = {name: place for name, place in template.places.items() if name != "mouth_inner_top"}
+    sides = np.zeros((len(template.surface.vertices), 3))
+    assert find_margins(template.surface, LIPS, places, sides) is None
+    places["mouth_inner_top"] = places["mouth_inner_bottom"]            # painted on: one line
+    assert find_margins(template.surface, LIPS, places, sides) is None
