@@ -42,7 +42,9 @@ _SHUT, _SHUT_MM = 0.06, 0.3
 # Lids keep the distance from the ball that they have at rest, up to so many radii from its centre.
 _ON_THE_BALL = 1.25
 # What moves over this share of the radius is lifted out of the eye, by this share: a rim may lie in the ball at rest.
-_LIFTED, _OUT = 0.15, 0.03
+_LIFTED, _OUT = 0.15, 0.02
+# The middle of a triangle with sides s lies nearer to the eye than its corners: sqrt(1 - s^2 / 3), at most so much.
+_MOST_SAG = 0.3
 # What stands out of an eye, a cornea or a glint, counts so many radii around: lids of few vertices span it.
 _AROUND = 0.3
 _TINY = 1e-300
@@ -83,6 +85,7 @@ class Closing:
     rows: NDArray[np.int64]         # the vertices that take part
     field_upper: Array
     field_lower: Array
+    edges: NDArray[np.int64]        # (e, 2), among those rows
     along: sparse.csr_array         # (rows, SAMPLES)
     rest: Array                     # (n, 3)
     ball: Eyeball | None
@@ -131,13 +134,22 @@ class Closing:
         step = step @ inverse
         then = now + step
         lift = np.clip(np.linalg.norm(then - at_rest, axis=1) / _LIFTED, 0.0, 1.0)
-        wanted = np.where(home < _ON_THE_BALL, np.maximum(home, self.front(then) + _OUT), 0.0)
+        wanted = np.where(home < _ON_THE_BALL, np.maximum(home, self._over(then)), 0.0)
         radius = radius + lift * np.maximum(wanted - radius, 0.0)
         length = np.linalg.norm(then, axis=1)
         changed = (step != 0).any(axis=1) & (length > _TINY)
         then = then * np.where(changed, radius / np.maximum(length, _TINY), 1.0)[:, None]
         moved[self.rows] = np.where(changed[:, None], then @ self.ball.shape + self.ball.centre - rest,
                                     moved[self.rows])
+
+
+    def _over(self, places: Array) -> Array:
+        """Return the radius (rows,) at which triangles with corners in these directions clear the eye."""
+        unit = places / np.maximum(np.linalg.norm(places, axis=1), _TINY)[:, None]
+        side = ((unit[self.edges[:, 0]] - unit[self.edges[:, 1]]) ** 2).sum(axis=1)
+        longest = np.zeros(len(places))
+        np.maximum.at(longest, self.edges.ravel(), np.repeat(side, 2))
+        return (self.front(places) + _OUT) / np.sqrt(1 - np.minimum(longest / 3, _MOST_SAG))
 
 
 def closing(skin: Skin, slit: Slit, ball: Eyeball | None = None, eye: Array | None = None) -> Closing | None:
@@ -157,8 +169,8 @@ def closing(skin: Skin, slit: Slit, ball: Eyeball | None = None, eye: Array | No
                      lips=slit is LIPS)
     width = float(np.linalg.norm(own.line[0, -1] - own.line[0, 0]))
     front = _Front(ball, eye) if ball is not None and eye is not None else None
-    rows, upper, lower, along = _fields(skin, margins, own, _REACH * width)
-    return Closing(margins, rows, upper, lower, along, skin.surface.vertices, ball, front, wanted)
+    rows, upper, lower, edges, along = _fields(skin, margins, own, _REACH * width)
+    return Closing(margins, rows, upper, lower, edges, along, skin.surface.vertices, ball, front, wanted)
 
 
 def _wanted(rest: Array, motion: Array, own: Margins, avatar: Array, margins: Margins, part: Array, *,
@@ -204,8 +216,8 @@ def _smooth_step(t: Array) -> Array:
 
 
 def _fields(skin: Skin, margins: Margins, own: Margins, reach: float):
-    """Return the vertices near the slit, how much they go with its upper and with its lower edge, and the weights
-    (rows, SAMPLES) that tell their place along it."""
+    """Return the vertices near the slit, how much they go with its upper and with its lower edge, the mesh's edges
+    (e, 2) among them, and the weights (rows, SAMPLES) that tell their place along it."""
     tree = cKDTree(own.line.reshape(-1, 3))
     distance, _ = tree.query(skin.registered)
     near = distance < reach
@@ -232,7 +244,7 @@ def _fields(skin: Skin, margins: Margins, own: Margins, reach: float):
     index = np.repeat(np.arange(len(rows)), 2)
     along = sparse.csr_array((np.stack([1 - share, share], axis=1).ravel(),
                               (index, np.stack([left, left + 1], axis=1).ravel())), shape=(len(rows), SAMPLES))
-    return rows, upper, lower, along
+    return rows, upper, lower, surface.edges[0], along
 
 
 def _where(skin: Skin, margins: Margins, rows: NDArray, edges: NDArray) -> Array:
