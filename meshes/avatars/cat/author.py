@@ -29,8 +29,8 @@ from sheet import Sheet  # noqa: E402
 from facegen.geometry.mesh import Mesh, merge  # noqa: E402
 
 COLOURS = {
-    "fur": (214, 148, 88), "fur_light": (242, 234, 222), "fur_dark": (168, 98, 50), "rim": (66, 44, 38),
-    "nose": (214, 132, 126), "inner_pink": (226, 178, 164), "lips": (150, 92, 84), "mouth": (120, 52, 50),
+    "fur": (214, 148, 88), "fur_light": (242, 234, 222), "fur_pale": (232, 184, 132), "fur_dark": (172, 104, 56), "rim": (66, 44, 38),
+    "nose": (214, 132, 126), "inner_pink": (226, 178, 164), "lips": (112, 72, 66), "mouth": (120, 52, 50),
     "nostril": (92, 50, 46), "sclera": (222, 214, 190), "iris": (146, 176, 84), "iris_edge": (104, 132, 58), "limbus": (44, 48, 28),
     "pupil": (12, 12, 12), "teeth": (246, 240, 224), "gums": (196, 110, 108), "tongue": (214, 122, 120),
     "whiskers": (248, 246, 240),
@@ -41,12 +41,14 @@ EAR = 20            # vertices round an ear
 GAP = 0.012         # between the lips
 DECIMALS = 4
 
-OPENING = almond(LID, 60, 43, 36, point=0.42, inner_drop=9, lean=0.12)
+OPENING = almond(LID, 60, 39, 35, point=0.4, inner_drop=9, lean=0.10)
+LID_RINGS = {"offsets": (0.4, 0.2, 0.07), "crest": 1.05, "inside": 1.02, "pocket": 1.4}
+LIP_OFFSETS = (0.3, 0.07)
 # Colours by their outlines seen from the front, left half: (x, y), and the least z.
 PATCHES = (
     ("nose", 3.9, ((-0.1, -0.48), (0.42, -0.52), (0.66, -0.7), (0.56, -0.98), (0.3, -1.1), (0.1, -1.32), (-0.1, -1.36))),
-    ("fur_dark", -1.0, ((-0.1, 2.3), (0.16, 2.3), (0.2, 3.2), (0.14, 4.2), (-0.1, 4.3))),
-    ("fur_dark", -1.0, ((0.62, 2.25), (0.92, 2.15), (1.2, 3.2), (1.25, 4.1), (0.95, 4.1), (0.85, 3.2))),
+    ("fur_dark", -1.0, ((-0.1, 2.3), (0.2, 2.3), (0.27, 3.1), (0.2, 4.0), (-0.1, 4.1))),
+    ("fur_dark", -1.0, ((0.68, 2.3), (1.12, 2.2), (1.4, 3.1), (1.36, 3.8), (0.95, 3.9), (0.85, 3.1))),
     ("fur_light", -0.5, ((-0.1, 1.25), (0.14, 1.1), (0.3, 0.2), (0.55, -0.4), (1.05, -0.75), (1.9, -1.15), (2.5, -1.75),
                          (2.6, -2.6), (2.3, -3.4), (2.0, -9.0), (-0.1, -9.0))),
 )
@@ -65,14 +67,15 @@ def ear_ring(height: float, count: int = EAR) -> NDArray:
     """Return a ring of the left ear: a crescent, hollow towards the front, narrowing to the tip. height: 0 to 1."""
     t = 2 * np.pi * np.arange(count) / count
     axis, wide, front = model.EAR_AXES
-    width = 1.72 * (1 - height) ** 0.8 * (1 + 0.25 * height)
-    hollow = 0.62 * (1 - height) ** 0.6
-    thick = 0.30 * (1 - height) ** 0.7 + 0.05
+    narrow = 1 - height
+    width = 1.8 * narrow**0.75 * (1 + 0.2 * height)
+    hollow, thick = 0.85 * narrow**0.6, 0.2 * narrow**0.5
     s = np.sin(t)
-    depth = np.where(s > 0, -hollow * s, hollow * s + thick * s)
-    along = height * model.EAR_HEIGHT
-    lean = 0.35 * height**2 * wide - 0.25 * np.sin(np.pi * height) * wide
-    return model.EAR_BASE + along * axis + lean + width * np.cos(t)[:, None] * wide + depth[:, None] * front
+    depth = -hollow * np.abs(s) ** 0.8 - np.where(s > 0, 0.0, thick * (0.6 + 0.4 * np.abs(s)))
+    depth[np.abs(s) < 1e-9] = -0.3 * thick
+    lean = (0.35 * height**2 - 0.25 * np.sin(np.pi * height)) * wide
+    return (model.EAR_BASE + height * model.EAR_HEIGHT * axis + lean + width * np.cos(t)[:, None] * wide
+            + depth[:, None] * front)
 
 
 def ear_loop(clay: Clay) -> NDArray:
@@ -102,10 +105,10 @@ def neck_loop(clay: Clay) -> NDArray:
 
 def head(clay: Clay) -> Sheet:
     """Return the skin of the left half."""
-    lids = lid_rings(model.EYE, clay, OPENING, (0.42, 0.2, 0.08), crest=1.05, inside=1.02, pocket=1.4)
+    lids = lid_rings(model.EYE, clay, OPENING, **LID_RINGS)
     slit = clay.onto(curve(model.MOUTH_LINE, LIP + 1), 0.0)
     slit[0, 0] = 0.0
-    lips = lip_rows(slit, clay, (0.3, 0.11), gap=GAP)
+    lips = lip_rows(slit, clay, LIP_OFFSETS, gap=GAP)
     nostril = nostril_loop(clay, 1.0)
     loops = {"eye": lids[0], "mouth": lips[0], "ear": ear_loop(clay), "nostril": nostril, "neck": neck_loop(clay)}
     fixed = np.concatenate(list(loops.values()))
@@ -113,13 +116,17 @@ def head(clay: Clay) -> Sheet:
     rows = {name: np.arange(a, b) for name, a, b in zip(loops, ends[:-1], ends[1:], strict=True)}
     middle = middle_line(clay, fixed, rows)
     fixed = np.concatenate([fixed, middle])
+    lines: list[tuple[int, int]] = []
     for _, least, outline in PATCHES:
-        fixed = np.concatenate([fixed, patch_edge(clay, outline, least, fixed, rows)])
+        edge = patch_edge(clay, outline, least, fixed, rows)
+        near = np.linalg.norm(np.diff(edge, axis=0), axis=1) < 1.7 * spacing(edge[:-1])
+        lines += [(len(fixed) + i, len(fixed) + i + 1) for i in np.flatnonzero(near)]
+        fixed = np.concatenate([fixed, edge])
     d = directions(24000)
     free = clay.shoot(model.CENTRE, d[d[:, 0] > 0], 9.0)
     free = free[outside(free, fixed, rows)]
     free = scatter(free, spacing, fixed)
-    vertices, faces = cover(clay, model.CENTRE, fixed, free, list(rows.values()), [])
+    vertices, faces = cover(clay, model.CENTRE, fixed, free, list(rows.values()), lines)
     sheet = Sheet("skin")
     sheet.row(vertices)
     sheet.triangles(faces, colours(vertices[faces].mean(axis=1)))
@@ -180,7 +187,7 @@ def colours(middles: NDArray) -> list[str]:
 
 def add_lids(sheet: Sheet, loop: NDArray, rings: list[NDArray]) -> None:
     rows = [loop, *(sheet.row(r) for r in rings[1:])]
-    for a, b, name in zip(rows[:-1], rows[1:], ["fur_light", "fur_light", "rim", "rim", "rim", "rim"], strict=True):
+    for a, b, name in zip(rows[:-1], rows[1:], ["fur", "fur_pale", "rim", "rim", "rim", "rim"], strict=True):
         sheet.band(a, b, name)
 
 
@@ -229,11 +236,11 @@ def whiskers(clay: Clay) -> Sheet:
         for place in range(2):
             root = clay.onto(np.array([[0.98 + 0.28 * place, -1.42 - 0.26 * row - 0.03 * place, 4.6 - 0.25 * place]]))[0]
             away = np.array([1.0, 0.16 - 0.2 * row, 0.12 - 0.22 * place])
-            t = np.linspace(0, 1, 6)[:, None]
+            t = np.linspace(0, 1, 7)[:, None]
             spine = root + 4.3 * (1 - 0.12 * row) * (t * away + t**2 * np.array([-0.06, -0.12, -0.2]))
             ring = 2 * np.pi * np.arange(3) / 3
             rings = [p + r * np.stack([0 * ring, np.cos(ring), np.sin(ring)], axis=1)
-                     for p, r in zip(spine, np.linspace(0.028, 0.006, 6), strict=True)]
+                     for p, r in zip(spine, np.linspace(0.03, 0.012, 7), strict=True)]
             rows = sheet.tube(rings, "whiskers")
             sheet.cap(rows[0], "whiskers")
             sheet.cap(rows[-1], "whiskers")
@@ -246,16 +253,16 @@ def inner_parts() -> list[Mesh]:
     pupil = ellipse(n, 8.5, 31)
     outlines = [0.5 * pupil, pupil, 0.5 * pupil + 0.5 * ellipse(n, 40, 44), ellipse(n, 52, 52), ellipse(n, 58, 58)]
     materials = ["pupil", "pupil", "iris", "iris_edge", "limbus", "sclera"]
-    eyes = [eyeball(name, model.EYE, outlines, materials, mirror=right)
+    eyes = [eyeball(name, model.BALL, outlines, materials, mirror=right)
             for name, right in (("eye_L", False), ("eye_R", True))]
-    fang, small = (0.27, 0.27, 0.72), (0.15, 0.13, 0.16)
+    fang, small = (0.25, 0.25, 0.6), (0.15, 0.13, 0.16)
     upper = [(0.5 + s * x, *size) for s in (-1, 1) for x, size in
              ((0.03, small), (0.085, small), (0.14, small), (0.215, fang), (0.33, (0.2, 0.15, 0.22)), (0.4, (0.3, 0.16, 0.28)))]
     lower = [(0.5 + s * x, *size) for s in (-1, 1) for x, size in
              ((0.03, small), (0.085, small), (0.165, (0.23, 0.23, 0.5)), (0.3, (0.2, 0.15, 0.22)), (0.38, (0.3, 0.16, 0.26)))]
-    arch_upper = [(1.05, -1.72, 2.2), (0.92, -1.72, 3.0), (0.6, -1.7, 3.7), (0, -1.66, 3.95), (-0.6, -1.7, 3.7),
+    arch_upper = [(1.05, -1.72, 2.2), (0.92, -1.72, 3.0), (0.58, -1.7, 3.55), (0, -1.66, 3.8), (-0.58, -1.7, 3.55),
                   (-0.92, -1.72, 3.0), (-1.05, -1.72, 2.2)]
-    arch_lower = [(0.92, -2.62, 2.0), (0.8, -2.64, 2.8), (0.5, -2.66, 3.45), (0, -2.66, 3.7), (-0.5, -2.66, 3.45),
+    arch_lower = [(0.92, -2.62, 2.0), (0.8, -2.64, 2.8), (0.46, -2.62, 3.3), (0, -2.6, 3.5), (-0.46, -2.62, 3.3),
                   (-0.8, -2.64, 2.8), (-0.92, -2.62, 2.0)]
     return [*eyes, gum_and_teeth("teeth_upper", arch_upper, (0, -1, 0), 0.19, upper, lean=0.05).mesh(),
             gum_and_teeth("teeth_lower", arch_lower, (0, 1, 0), 0.17, lower, lean=0.1).mesh(),
@@ -264,10 +271,10 @@ def inner_parts() -> list[Mesh]:
 
 
 def landmarks(clay: Clay, mesh: Mesh) -> dict[str, str]:
-    lids = lid_rings(model.EYE, clay, OPENING, (0.42, 0.2, 0.08), crest=1.05, inside=1.02, pocket=1.4)[3]
+    lids = lid_rings(model.EYE, clay, OPENING, **LID_RINGS)[3]
     slit = clay.onto(curve(model.MOUTH_LINE, LIP + 1), 0.0)
     slit[0, 0] = 0.0
-    lips = lip_rows(slit, clay, (0.3, 0.11), gap=GAP)
+    lips = lip_rows(slit, clay, LIP_OFFSETS, gap=GAP)
     front = lambda x, y: clay.shoot(np.array([x, y, 0.0]), np.array([[0.0, 0.0, 1.0]]), 8.0)[0]  # noqa: E731
     side = lambda y, z: clay.shoot(np.array([0.0, y, z]), np.array([[1.0, 0.0, 0.0]]), 8.0)[0]  # noqa: E731
     q, m = LID // 4, LIP
@@ -276,7 +283,7 @@ def landmarks(clay: Clay, mesh: Mesh) -> dict[str, str]:
         "eye_inner_L": lids[2 * q], "eye_outer_L": lids[0], "eye_upper_L": lids[q], "eye_lower_L": lids[3 * q],
         "eye_upper_outer_L": lids[q // 2], "eye_upper_inner_L": lids[q + q // 2 + 1],
         "eye_lower_inner_L": lids[2 * q + q // 2], "eye_lower_outer_L": lids[3 * q + q // 2 + 1],
-        "eye_center_L": model.EYE.on_ball(np.zeros((1, 2)))[0],
+        "eye_center_L": model.BALL.on_ball(np.zeros((1, 2)))[0],
         "nose_tip": front(0.0, -0.72), "nose_bridge": front(0.0, 0.6), "nose_wing_L": front(0.62, -0.85),
         "nose_base": front(0.0, -1.3),
         "mouth_corner_L": lips[-1][m], "mouth_top": lips[1][0], "mouth_inner_top": lips[-1][0],

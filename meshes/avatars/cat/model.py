@@ -7,7 +7,8 @@ from clay import Clay, ball, curve, rotation, stroke
 from eyes import Eye
 
 # Midway between the eyes is (0, 0.55, 3.0): the origin lies inside the head, which is nine centimetres wide.
-EYE = Eye.looking((1.88, 0.55, 2.02), 1.22, yaw=11.0, pitch=0.0, roll=17.0)
+EYE = Eye.looking((1.88, 0.55, 2.02), 1.22, yaw=11.0, pitch=0.0, roll=16.0)
+BALL = Eye.looking(EYE.centre, EYE.radius, yaw=11.0, pitch=0.0)        # the pupil stands upright
 # The line where the lips meet, from the middle to the left corner.
 MOUTH_LINE = ((0.0, -1.98, 4.9), (0.35, -2.2, 4.9), (0.85, -2.37, 4.6), (1.4, -2.36, 4.1), (1.85, -2.1, 3.4),
               (2.1, -1.82, 2.75))
@@ -19,7 +20,7 @@ NECK_PLANE = (np.array([0.0, -4.6, -2.6]), np.array([0.0, -0.85, -0.53]))
 def clay() -> Clay:
     """Return the head without ears."""
     c = Clay()
-    c.add(ball((0, 0.9, -0.9), (4.15, 3.75, 4.3)))                                   # skull
+    c.add(ball((0, 0.8, -0.9), (4.2, 3.55, 4.3)))                                    # skull
     c.add(ball((2.6, -1.3, 0.0), (1.95, 1.95, 2.4), rotation((0, 0, 1), 30)), 1.6, pair=True)   # cheeks
     c.add(stroke([(0, -1.5, -1.5), (0, -6.5, -4.6)], [3.3, 3.4]), 2.2)               # neck
     c.add(ball((0, 2.1, 1.3), (2.7, 1.9, 1.9)), 1.2)                                 # forehead
@@ -47,6 +48,6 @@ def _axes(axis, wide) -> np.ndarray:
 
 NOSTRIL = (0.34, -0.93, 4.95)
 EAR_BASE = np.array([2.45, 3.05, -0.7])
-EAR_HEIGHT = 4.0
+EAR_HEIGHT = 3.7
 # Along the ear, across it (to its outer edge), and out of its hollow.
-EAR_AXES = _axes((0.42, 1.0, -0.08), (1.0, -0.3, -0.42))
+EAR_AXES = _axes((0.40, 1.0, -0.06), (1.0, -0.3, -0.75))

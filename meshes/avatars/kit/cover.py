@@ -85,14 +85,21 @@ def cover(clay: Clay, centre: NDArray, fixed: NDArray, free: NDArray, holes: Seq
     """Return (vertices (n, 3), faces (m, 3)) of the half x >= 0: ``fixed`` points first, then the ``free`` ones, moved.
 
     holes: loops, each the rows of ``fixed`` on it in order (if it crosses the middle, its half). lines: edges between
-    fixed points that no flip may remove.
+    fixed points that are wished for, as far as they cross nothing.
     """
     points = np.concatenate([fixed, free])
     right = np.flatnonzero(points[:, 0] > 0)
     all_points = np.concatenate([points, mirrored(points[right])])
     d = all_points - centre
     d /= np.linalg.norm(d, axis=1, keepdims=True)
-    faces = ConvexHull(d).simplices
+    edges = set(_middle_edges(points[:len(fixed)] - centre, holes))
+    for hole in holes:
+        ahead = hole[1:] if (points[hole, 0] <= 0).any() else np.roll(hole, -1)
+        edges |= {frozenset((int(a), int(b))) for a, b in zip(hole, ahead, strict=False)}
+    faces = recover(d, _outward(ConvexHull(d).simplices, d), edges)
+    wished = {frozenset(e) for e in lines}
+    faces = recover(d, faces, wished, required=False)
+    edges |= wished
     middles = d[faces].mean(axis=1)
     on_right = (faces < len(points)).all(axis=1)
     astride = (middles[:, 0] > 1e-9) & ~on_right
@@ -105,19 +112,82 @@ def cover(clay: Clay, centre: NDArray, fixed: NDArray, free: NDArray, holes: Seq
         dropped |= np.isin(faces, loop).all(axis=1) & inside(d[loop], middles)
     if (astride & ~dropped).any():
         raise ValueError(f"triangles astride the middle near {all_points[faces[astride & ~dropped][0]].round(2)}")
-    faces = _outward(faces[on_right & ~dropped], d)
-    edges = {frozenset(e) for e in lines}
-    for hole in holes:
-        ahead = hole[1:] if (points[hole, 0] <= 0).any() else np.roll(hole, -1)
-        edges |= {frozenset((int(a), int(b))) for a, b in zip(hole, ahead, strict=False)}
-    there = {frozenset((int(f[i - 1]), int(f[i]))) for f in faces for i in range(3)}
-    if edges - there:
-        near = [points[list(e)].mean(axis=0).round(2).tolist() for e in edges - there]
-        raise ValueError(f"{len(near)} edges of loops are cut by triangles, near {near[:5]}: space their points closer")
+    faces = faces[on_right & ~dropped]
     for round_number in range(_ROUNDS):
         faces = flip(points, faces, edges)
         points = _relax(clay, points, faces, len(fixed), last=round_number == _ROUNDS - 1)
     return points, flip(points, faces, edges)
+
+
+def _middle_edges(points: NDArray, holes: Sequence[NDArray]) -> list[frozenset]:
+    """Return the edges of the line x = 0, over all fixed points on it, without those that span a hole."""
+    rows = np.flatnonzero(np.abs(points[:, 0]) < 1e-9)
+    rows = rows[np.argsort(np.arctan2(points[rows, 1], points[rows, 2]))]
+    hole_of = {int(i): n for n, hole in enumerate(holes) for i in hole}
+    return [frozenset((int(a), int(b))) for a, b in zip(rows, np.roll(rows, -1), strict=True)
+            if hole_of.get(int(a), -1) != hole_of.get(int(b), -2)]
+
+
+def recover(d: NDArray, faces: NDArray, edges: set[frozenset], *, required: bool = True) -> NDArray:
+    """Return the triangles on directions (n, 3) after flips that bring back edges which other triangles cut.
+
+    required: ValueError for an edge that cannot be made. After S. W. Sloan, "A fast algorithm for generating constrained Delaunay triangulations", 1993.
+    """
+    faces = [tuple(int(i) for i in f) for f in faces]
+    beside = _beside(faces)
+
+    def side(a: int, b: int, p: int) -> float:
+        return float(np.cross(d[a], d[b]) @ d[p])
+
+    def cuts(p: int, q: int, a: int, b: int) -> bool:
+        return (side(p, q, a) * side(p, q, b) < 0 and side(a, b, p) * side(a, b, q) < 0 and d[p] @ d[a] > 0.5)
+
+    for a, b in (sorted(e) for e in edges if not beside.get(e)):
+        for _ in range(200):
+            crossing = [e for e, sides in beside.items() if len(sides) == 2 and not e & {a, b} and cuts(*e, a, b)]
+            if not crossing:
+                break
+            for edge in crossing:
+                p, q = edge
+                first, second = beside[edge]
+                c, e = (next(i for i in faces[n] if i not in edge) for n in (first, second))
+                if side(c, e, p) * side(c, e, q) < 0:       # convex: the other diagonal lies inside
+                    _swap(faces, beside, edge)
+                    break
+        if required and not beside.get(frozenset((a, b))):
+            raise ValueError(f"the edge {a}-{b} of a loop cannot be made: another point lies on it, or it crosses another")
+    return np.array(faces)
+
+
+def _beside(faces: list[tuple[int, ...]]) -> dict[frozenset, set[int]]:
+    """Return edge -> numbers of its triangles."""
+    beside: dict[frozenset, set[int]] = defaultdict(set)
+    for number, f in enumerate(faces):
+        for i in range(3):
+            beside[frozenset((f[i], f[i - 1]))].add(number)
+    return beside
+
+
+def _swap(faces: list[tuple[int, ...]], beside: dict[frozenset, set[int]], edge: frozenset) -> None:
+    """Put the other diagonal into the two triangles beside an edge."""
+    first, second = beside[edge]
+    c, a, b = _from_apex(faces[first], edge)
+    d = _from_apex(faces[second], edge)[0]
+    for number in (first, second):
+        g = faces[number]
+        for i in range(3):
+            beside[frozenset((g[i], g[i - 1]))].discard(number)
+    faces[first], faces[second] = (c, a, d), (c, d, b)
+    for number in (first, second):
+        g = faces[number]
+        for i in range(3):
+            beside[frozenset((g[i], g[i - 1]))].add(number)
+
+
+def _from_apex(face: tuple[int, ...], edge: frozenset) -> tuple[int, int, int]:
+    """Return a triangle's corners beginning with the one off the edge."""
+    at = next(i for i in range(3) if face[i] not in edge)
+    return face[at], face[(at + 1) % 3], face[(at + 2) % 3]
 
 
 def _outward(faces: NDArray, d: NDArray) -> NDArray:
@@ -145,10 +215,7 @@ def _relax(clay: Clay, points: NDArray, faces: NDArray, fixed: int, *, last: boo
 def flip(points: NDArray, faces: NDArray, keep: set[frozenset]) -> NDArray:
     """Return the faces after edge flips: the angles opposite to an edge add up to 180 degrees at most."""
     faces = [tuple(int(i) for i in f) for f in faces]
-    beside: dict[frozenset, set[int]] = defaultdict(set)
-    for number, f in enumerate(faces):
-        for i in range(3):
-            beside[frozenset((f[i], f[i - 1]))].add(number)
+    beside = _beside(faces)
     queue = list(beside)
     budget = 20 * len(queue)
     while queue and budget:
@@ -157,23 +224,11 @@ def flip(points: NDArray, faces: NDArray, keep: set[frozenset]) -> NDArray:
         if edge in keep or len(beside[edge]) != 2:
             continue
         first, second = beside[edge]
-        f = faces[first]
-        at = next(i for i in range(3) if f[i] not in edge)
-        c, a, b = f[at], f[(at + 1) % 3], f[(at + 2) % 3]
-        d = next(i for i in faces[second] if i not in edge)
-        if frozenset((c, d)) in beside and beside[frozenset((c, d))]:
+        c, a, b = _from_apex(faces[first], edge)
+        d = _from_apex(faces[second], edge)[0]
+        if beside.get(frozenset((c, d))) or not _wants_flip(points, a, b, c, d):
             continue
-        if not _wants_flip(points, a, b, c, d):
-            continue
-        for number in (first, second):
-            g = faces[number]
-            for i in range(3):
-                beside[frozenset((g[i], g[i - 1]))].discard(number)
-        faces[first], faces[second] = (c, a, d), (c, d, b)
-        for number in (first, second):
-            g = faces[number]
-            for i in range(3):
-                beside[frozenset((g[i], g[i - 1]))].add(number)
+        _swap(faces, beside, edge)
         queue += [frozenset(e) for e in ((a, c), (c, b), (a, d), (d, b))]
     return np.array(faces)
 

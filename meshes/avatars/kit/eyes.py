@@ -12,6 +12,9 @@ from sheet import Sheet
 
 from facegen.geometry.mesh import Mesh
 
+# Rounds of smoothing of the outermost ring; the nearer ones get fewer, the margin none.
+_EVENING = 4
+
 
 @dataclass(frozen=True)
 class Eye:
@@ -86,7 +89,12 @@ def lid_rings(eye: Eye, clay: Clay, outline: NDArray, offsets: Sequence[float], 
     for _ in range(2):
         out = out + 0.5 * (np.roll(out, 1, axis=0) + np.roll(out, -1, axis=0))
         out /= np.linalg.norm(out, axis=1, keepdims=True)
-    skin = [clay.onto(margin + d * out) for d in offsets]
+    skin = []
+    for d in offsets:
+        ring = clay.onto(margin + d * out)
+        for _ in range(int(_EVENING * d / max(offsets))):
+            ring = clay.onto(0.5 * ring + 0.25 * (np.roll(ring, 1, axis=0) + np.roll(ring, -1, axis=0)), steps=3)
+        skin.append(ring)
     return [*skin, margin, eye.on_ball(1.07 * outline, inside), eye.on_ball((1 + pocket) / 2 * outline, inside),
             eye.on_ball(pocket * outline, inside)]
 

@@ -50,7 +50,7 @@ def gum_and_teeth(part: str, arch: NDArray, down: ArrayLike, gum: float, teeth: 
     """
     sheet = Sheet(part)
     down = np.asarray(down, float) / np.linalg.norm(down)
-    path = curve(arch, 17)
+    path = curve(arch, 13)
     along = np.gradient(path, axis=0)
     along /= np.linalg.norm(along, axis=1, keepdims=True)
     out = np.cross(down, along)
@@ -74,8 +74,8 @@ def gum_and_teeth(part: str, arch: NDArray, down: ArrayLike, gum: float, teeth: 
 
 def tooth(sheet: Sheet, root: NDArray, along: NDArray, out: NDArray, down: NDArray, width: float, depth: float,
           length: float) -> None:
-    """Add a tooth: its rings of eight shrink towards a blunt tip; one much longer than wide curves back like a fang."""
-    t = 2 * np.pi * (np.arange(8) + 0.5) / 8
+    """Add a tooth: its rings of six shrink towards a blunt tip; one much longer than wide curves back like a fang."""
+    t = 2 * np.pi * (np.arange(6) + 0.5) / 6
     fang = length > 1.8 * width
     shape = ((0.0, 1.0), (0.35, 0.92), (0.7, 0.55), (0.93, 0.2)) if fang else \
         ((0.0, 0.85), (0.4, 1.0), (0.85, 0.95), (1.0, 0.7))
