@@ -19,25 +19,33 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from facegen.animation.clip import Clip
     from facegen.animation.script import load_clip, morph
+    from facegen.blendshapes.recipes import Recipe, shape_set
     from facegen.errors import FacegenError, FileError, InputError, JobError, NotationError, TableError
+    from facegen.face.avatar import AvatarFace
+    from facegen.face.convert import Conversion, convert
     from facegen.face.face import Controls, Face, face_names, load_face
     from facegen.facs.deformation import Deformation, load_deformation
     from facegen.facs.expression_table import people
     from facegen.facs.expressions import Resolution, presets, resolve
     from facegen.facs.notation import canonical, parse
     from facegen.facs.tables import load_expressions, load_person, load_units
+    from facegen.fileio.avatar import AvatarFile, load_avatar, save_avatar
     from facegen.fileio.images import contact_sheet, save_image
     from facegen.fileio.video import save_video
     from facegen.geometry.mesh import Mesh
     from facegen.jobs.batch import run_batch
     from facegen.jobs.frames import save_clip, save_turn
     from facegen.render import Renderer, Wireframe, render, render_passes, save_passes
+    from facegen.transfer.rig import avatar_names, rig
 
 __version__ = "0.1.0"
 
 __all__ = [
+    "AvatarFace",
+    "AvatarFile",
     "Clip",
     "Controls",
+    "Conversion",
     "Deformation",
     "Face",
     "FacegenError",
@@ -46,13 +54,17 @@ __all__ = [
     "JobError",
     "Mesh",
     "NotationError",
+    "Recipe",
     "Renderer",
     "Resolution",
     "TableError",
     "Wireframe",
+    "avatar_names",
     "canonical",
     "contact_sheet",
+    "convert",
     "face_names",
+    "load_avatar",
     "load_clip",
     "load_deformation",
     "load_expressions",
@@ -66,25 +78,32 @@ __all__ = [
     "render",
     "render_passes",
     "resolve",
+    "rig",
     "run_batch",
+    "save_avatar",
     "save_clip",
     "save_image",
     "save_passes",
     "save_turn",
     "save_video",
+    "shape_set",
 ]
 
 # Where each name lives. Read on first use (PEP 562), so that `import facegen` costs nothing.
 _HOMES = {
     "facegen.animation.clip": ("Clip",),
     "facegen.animation.script": ("load_clip", "morph"),
+    "facegen.blendshapes.recipes": ("Recipe", "shape_set"),
     "facegen.errors": ("FacegenError", "FileError", "InputError", "JobError", "NotationError", "TableError"),
+    "facegen.face.avatar": ("AvatarFace",),
+    "facegen.face.convert": ("Conversion", "convert"),
     "facegen.face.face": ("Controls", "Face", "face_names", "load_face"),
     "facegen.facs.deformation": ("Deformation", "load_deformation"),
     "facegen.facs.expression_table": ("people",),
     "facegen.facs.expressions": ("Resolution", "presets", "resolve"),
     "facegen.facs.notation": ("canonical", "parse"),
     "facegen.facs.tables": ("load_expressions", "load_person", "load_units"),
+    "facegen.fileio.avatar": ("AvatarFile", "load_avatar", "save_avatar"),
     "facegen.fileio.images": ("contact_sheet", "save_image"),
     "facegen.fileio.video": ("save_video",),
     "facegen.geometry.mesh": ("Mesh",),
@@ -94,6 +113,7 @@ _HOMES = {
     "facegen.render.passes": ("render_passes",),
     "facegen.render.passfiles": ("save_passes",),
     "facegen.render.render": ("Renderer",),
+    "facegen.transfer.rig": ("avatar_names", "rig"),
     "facegen": ("render",),                 # the package itself: calling it draws
 }
 _HOME = {name: module for module, names in _HOMES.items() for name in names}

@@ -89,11 +89,12 @@ def test_no_reference_data_in_the_project():
     """Scans and their parts are kept out: only these files may be larger than a page, and none is binary."""
     for path in [*(ROOT / "meshes").rglob("*"), *(ROOT / "tables").rglob("*")]:
         if path.is_file() and "__pycache__" not in path.parts:
-            assert path.suffix in {".obj", ".yaml", ".py", ".txt", ".md"}, path
-            assert path.stat().st_size < 400_000, path
+            assert path.suffix in {".mtl", ".obj", ".yaml", ".py", ".txt", ".md"}, path
+            avatar = "avatars" in path.parts                # heads authored in quads, by the script beside them
+            assert path.stat().st_size < (600_000 if avatar else 400_000), path
             path.read_text(encoding="utf-8")
     for path in (ROOT / "meshes").rglob("*.obj"):
-        assert path.read_text(encoding="utf-8").count("\nv ") < 5_000, path
+        assert path.read_text(encoding="utf-8").count("\nv ") < (12_000 if "avatars" in path.parts else 5_000), path
 
 
 def test_scripts_name_no_folder_of_ours():

@@ -12,6 +12,7 @@ import typer
 
 from facegen import __version__
 from facegen.cli import batch, explain, figures, film, gallery, listing, picture
+from facegen.cli import rig as rigging
 from facegen.errors import FacegenError, InputError
 
 DONE, STOPPED, WRONG = 0, 1, 2
@@ -31,6 +32,7 @@ app.command("figures")(figures.figures)
 app.command("animate")(film.animate)
 app.command("morph")(film.morph)
 app.command("turntable")(film.turntable)
+app.command("rig")(rigging.rig)
 
 
 def _version(asked: bool) -> None:

@@ -50,7 +50,7 @@ def explain(what: What, face: FaceName = "akimoto", person: PersonName = None, i
 
     The chain is name -> action units -> deformation data, with its numbers.
     """
-    meaning = read_what(what, person=person, intensity=intensity, quiet=quiet)
+    meaning = read_what(what, person=person, intensity=intensity, quiet=quiet, face=face)
     data = _gather(meaning, face) | {"person": person, "intensity": intensity}
     if json:
         print_json(data)
@@ -65,9 +65,13 @@ def _gather(meaning: Resolution, face: str) -> dict[str, Any]:
     from facegen.facs.tables import load_units
 
     table, rig, one = load_units(), load_face(face), meaning.expression
-    controls = rig.controls(meaning.deformation, strict=not meaning.units)
-    millimetres = {name: [round(float(c), 3) + 0.0 for c in vector]
-                   for name, vector in zip(rig.feature_points, controls.vectors, strict=True) if vector.any()}
+    moved: dict[str, Any] = {"millimetres": {}}
+    if hasattr(rig, "shape_weights"):       # an avatar is moved by its blendshapes, not by feature points
+        moved["shapes"] = {name: round(weight, 6) for name, weight in rig.shape_weights(meaning).items()}
+    else:
+        controls = rig.controls(meaning.deformation, *meaning.more, strict=not meaning.units)
+        moved["millimetres"] = {name: [round(float(c), 3) + 0.0 for c in vector] for name, vector
+                                in zip(rig.feature_points, controls.vectors, strict=True) if vector.any()}
     letters = {weight: letter for letter, weight in table.catalogue.letters.items()}
     units = [{"code": code, "name": unit.name, "weight": weight, "letter": letters.get(weight),
               "effect": unit.effect, "muscles": list(unit.muscles)}
@@ -77,7 +81,7 @@ def _gather(meaning: Resolution, face: str) -> dict[str, Any]:
         "about": one.about if one else None, "source": meaning.source, "units": units,
         "combinations": list(_combinations(table, meaning.units)),
         "coefficients": {name: round(value, 6) for name, value in table.coefficients(meaning.units).items()},
-        "deformation": meaning.deformation.as_dict(), "face": face, "millimetres": millimetres,
+        "deformation": meaning.deformation.as_dict(), "face": face, **moved,
         "warnings": list(meaning.warnings),
     }
 
@@ -137,6 +141,10 @@ def _movements(data: Mapping[str, Any], full: bool) -> Iterator[str]:
     if raw.get("folds"):
         rows.append(("  folds", ", ".join(f"{name} {value:.2g}" for name, value in raw["folds"].items())))
     yield from columns(rows)
+    if "shapes" in data:
+        yield f"  blendshapes of {data['face']}" + (":" if data["shapes"] else ": none, nothing moves")
+        yield from columns([(f"    {name}", f"{weight:.3g}") for name, weight in data["shapes"].items()])
+        return
     points = sorted(data["millimetres"].items(), key=lambda item: -_length(item[1]))
     if points:
         shown = points if full else points[:SHOWN]

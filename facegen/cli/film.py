@@ -102,7 +102,7 @@ def turntable(what: What, output: Out = None, seconds: Seconds = 4.0,
     out = _target(output)
     yaws = _yaws(turn)
     pixels, ground = read_size(size), read_background(background)
-    meaning = read_what(what, person=person, intensity=intensity, quiet=quiet)
+    meaning = read_what(what, person=person, intensity=intensity, quiet=quiet, face=face)
     from facegen.animation.clip import Clip
     from facegen.jobs.frames import save_turn
 

@@ -15,7 +15,7 @@ from facegen.errors import InputError
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from facegen.face.face import Face
+    from facegen.face.rig import Rig
     from facegen.geometry.camera import Camera
 
 BASIC = ("neutral", "happiness", "sadness", "surprise", "fear", "anger", "disgust", "contempt")
@@ -24,6 +24,8 @@ LIDS = ("0", "5E", "7E", "42E", "43E", "6E+43E", "L46E", "63E", "64E")
 MOUTHS = ("0", "25E", "26E", "27E", "12E+25E", "10E+25E", "16E+25E", "22E+25E", "19E+25D+26D")
 # What a close-up looks at, mm, and how many times larger than the whole head it is drawn.
 CLOSE = {"eyes": ((0.0, 2.0, 20.0), 2.2), "mouth": ((0.0, -67.0, 20.0), 2.6)}
+# ... and on an avatar: what the landmarks there are called, and the share of the picture that they take.
+MARKS, CLOSE_SHARE = {"eyes": ("eye_",), "mouth": ("mouth_",)}, 0.65
 FORMATS = ("webp", "png", "jpg")
 
 Folder = Annotated[Path | None, typer.Option("--output", "-o", metavar="DIR",
@@ -65,7 +67,8 @@ def gallery(output: Folder = None, face: FaceName = "akimoto", person: PersonNam
     from facegen.fileio.images import contact_sheet, save_image
     from facegen.fileio.textfile import make_folder
 
-    rig, sheets = load_face(face), tuple(_sheets(person))
+    rig = load_face(face)
+    sheets = tuple(sheet for sheet in _sheets(person) if rig.landmarks or not any(one.close for one in sheet.pictures))
     folder = make_folder(output)
     with progress("pictures", sum(len(sheet.pictures) for sheet in sheets), quiet=quiet) as step:
         for sheet in sheets:
@@ -104,7 +107,7 @@ def _sheets(person: str | None) -> Iterator[Sheet]:
                                  for script in scripts for view in ((0.0, 0.0), (35.0, 0.0))))
 
 
-def _draw(rig: Face, one: Picture, person: str | None, size: int) -> NDArray[Any]:
+def _draw(rig: Rig, one: Picture, person: str | None, size: int) -> NDArray[Any]:
     """Return the picture (size, size, 4)."""
     from facegen.render import render
 
@@ -113,12 +116,18 @@ def _draw(rig: Face, one: Picture, person: str | None, size: int) -> NDArray[Any
     return render(rig, one.what, person=person, size=size, view=one.view, detail=detail, camera=camera)
 
 
-def _close_up(rig: Face, one: Picture, size: int, detail: int) -> Camera:
+def _close_up(rig: Rig, one: Picture, size: int, detail: int) -> Camera:
     """Return the camera of a close-up."""
     import numpy as np
 
     from facegen.geometry.camera import frame
+    from facegen.render.dress import portrait
 
     target, zoom = CLOSE[str(one.close)]
-    whole = frame(rig.mesh(detail).vertices, size=(size, size), view=one.view)
+    vertices = rig.mesh(detail).vertices
+    whole = frame(portrait(rig, vertices), size=(size, size), view=one.view)
+    if not hasattr(rig, "feature_points"):      # an avatar has its eyes and mouth elsewhere, and larger or smaller
+        places = [at for name, at in rig.landmark_points(vertices, detail=detail).items()
+                  if name.startswith(MARKS[str(one.close)])]
+        target, zoom = np.mean(places, axis=0), CLOSE_SHARE * size / (whole.scale * np.ptp(places, axis=0).max())
     return replace(whole, target=np.array(target), scale=whole.scale * zoom, offset=(size / 2, size / 2))

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import Any
+from typing import Annotated, Any
 
 import typer
 
 from facegen.cli.options import Json, PersonName, columns, print_json
+
+ShapeSet = Annotated[str, typer.Option("--set", metavar="SET", help="arkit, visemes, vrm, units, expressions or all.")]
 
 app = typer.Typer(help="Names that the other commands take.", rich_markup_mode=None, no_args_is_help=False)
 
@@ -48,6 +50,21 @@ def units(json: Json = False) -> None:
              "muscles": list(unit.muscles), "region": unit.region, "source": unit.source}
             for unit in load_catalogue().units.values()]
     _show(rows, [(" ".join(row["codes"]), row["name"], row["effect"]) for row in rows], json)
+
+
+@app.command()
+def shapes(name: ShapeSet = "arkit", person: PersonName = None, json: Json = False) -> None:
+    """Blendshapes of a vocabulary: name, what it is made of, what is seen.
+
+    arkit (Apple's 52), visemes (15), vrm (the presets of VRM 1.0), units, expressions or all.
+    """
+    from facegen.blendshapes.recipes import shape_set
+
+    rows = [{"name": shape, "set": one.set, "recipe": one.script, "units": dict(one.members), "corrects": one.minus,
+             "about": one.about, "also": list(one.also), "source": one.source}
+            for shape, one in shape_set(name, person).items()]
+    lines = [(row["name"], row["recipe"], row["about"]) for row in rows]
+    _show(rows, lines, json)
 
 
 @app.command()

@@ -21,7 +21,7 @@ What = Annotated[str, typer.Argument(
     metavar="WHAT", help='An expression ("happiness"), a FACS script ("6C+12D"), a preset (figure-8) or the '
                          "path of a deformation file.")]
 FaceName = Annotated[str, typer.Option(
-    "--face", metavar="FACE", help="A face's name, or the path of its face.yaml.")]
+    "--face", metavar="FACE", help="A face's name, the path of its face.yaml, or of a rigged avatar (.glb, .vrm).")]
 PersonName = Annotated[str | None, typer.Option(
     "--person", metavar="PERSON", help="Whose habits: a person's name, or the path of their table.")]
 Intensity = Annotated[float, typer.Option("--intensity", metavar="0..1", help="Scales the whole expression.")]
@@ -62,14 +62,20 @@ def _option(parse: Callable[[str], Any], text: str) -> Any:
         raise InputError(f"--{error}") from error
 
 
-def read_what(what: str, *, person: str | None, intensity: float, quiet: bool) -> Resolution:
-    """Return what a command's WHAT means; warnings go to stderr."""
+def read_what(what: str, *, person: str | None, intensity: float, quiet: bool, face: str | None = None) -> Resolution:
+    """Return what a command's WHAT means, with what the face, if given, has to warn of; warnings go to stderr."""
+    from dataclasses import replace
+
     from facegen.facs.expressions import full_name, resolve
 
-    resolution = resolve(full_name(what), person=person, intensity=intensity)
+    meaning = resolve(full_name(what), person=person, intensity=intensity)
+    if face is not None:
+        from facegen.face.face import load_face
+
+        meaning = replace(meaning, warnings=(*meaning.warnings, *load_face(face).check(meaning)))
     if not quiet:
-        warn(resolution.warnings)
-    return resolution
+        warn(meaning.warnings)
+    return meaning
 
 
 def warn(warnings: Iterable[str]) -> None:

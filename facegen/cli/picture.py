@@ -64,7 +64,7 @@ def render(what: What, output: Out = None, face: FaceName = "akimoto", person: P
     check_image_path(output)
     wanted = read_passes(passes, output, exact=npz)
     angles, pixels, ground = read_view(view), read_size(size), read_background(background)
-    meaning = read_what(what, person=person, intensity=intensity, quiet=quiet)
+    meaning = read_what(what, person=person, intensity=intensity, quiet=quiet, face=face)
 
     from facegen.face.face import load_face
     from facegen.render import Wireframe, render_passes, save_passes

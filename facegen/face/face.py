@@ -8,9 +8,9 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
-from functools import cache, cached_property
+from functools import cache, cached_property, lru_cache
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +22,7 @@ from facegen.face.attach import attach
 from facegen.face.deformer import Array, Deformer
 from facegen.face.eye import eyeball_radius
 from facegen.face.folds import fold_field
+from facegen.face.head import turn_head
 from facegen.face.landmarks import landmark_weights
 from facegen.face.loader import FaceData, read_face
 from facegen.facs.deformation import Deformation, weighted_sum
@@ -30,8 +31,17 @@ from facegen.geometry.mesh import Mesh, merge
 from facegen.geometry.normals import vertex_normals
 from facegen.geometry.subdivision import inherited_sides, loop_once
 
+if TYPE_CHECKING:
+    from facegen.face.avatar import AvatarFace
+
 MAX_DETAIL = 3
 """Finest subdivision level; every level samples the surface of this one."""
+
+AVATARS = (".glb", ".gltf", ".vrm")
+"""Files of avatars, which may have blendshapes."""
+
+BARE = (".obj", ".ply", ".stl")
+"""Files of meshes, which cannot have any."""
 
 DEEPEST_FOLD = 1.25
 """Largest amount of a fold."""
@@ -144,9 +154,8 @@ class Face:
         cannot be understood.
         """
         found = self.resolve(what, person=person, intensity=intensity)
-        whole = weighted_sum([(1.0, self._in_millimetres(one)) for one in (found.deformation, *found.more)]) \
-            if found.more else found.deformation
-        return self.pose_controls(self.controls(whole, strict=not found.units), detail=detail)
+        controls = self.controls(found.deformation, *found.more, strict=not found.units)
+        return self.pose_controls(controls, detail=detail)
 
     def resolve(self, what: Any, *, person: Any = None, intensity: float = 1.0) -> Resolution:
         """Return the chain name -> units -> deformation data (Akimoto 1986, fig. 10).
@@ -157,12 +166,20 @@ class Face:
             return what
         return resolve(what, person=person, intensity=intensity)
 
-    def controls(self, deformation: Deformation, *, strict: bool = True) -> Controls:
-        """Return the deformer's input, mm and degrees, for deformation data in its own units.
+    def check(self, meaning: Resolution) -> tuple[str, ...]:
+        """Return nothing to warn of; InputError if raw data name a feature point or fold that this face lacks."""
+        if not meaning.units:
+            self.controls(meaning.deformation, *meaning.more)
+        return ()
+
+    def controls(self, deformation: Deformation, *more: Deformation, strict: bool = True) -> Controls:
+        """Return the deformer's input, mm and degrees, for deformation data in its own units, or the sum of several.
 
         A feature point or fold that this face lacks, or a point that takes no input, is an InputError; with
         ``strict=False`` it is passed over: a face of fifteen points takes of the common tables what it can.
         """
+        if more:
+            deformation = weighted_sum([(1.0, self._in_millimetres(one)) for one in (deformation, *more)])
         d = self._data
         scale, mouth = self._lengths(deformation.units)
         vectors = np.zeros((len(d.point_names), 3))
@@ -213,7 +230,7 @@ class Face:
         for a in d.attachments:
             pieces.append(a.move(moved_cage, controls, self.deformer))
         vertices = np.concatenate(pieces, axis=-2)
-        return self._turn_head(vertices, controls.head, level.head_weight)
+        return turn_head(vertices, controls.head, d.head_pivot, level.head_weight)
 
     def _lengths(self, units: str) -> tuple[Array, Array]:
         """Return the millimetres of a unit of length: at each feature point (k, 3), and of the jaw and head (3,)."""
@@ -262,25 +279,6 @@ class Face:
         least = eyeball_radius(cosine) + LID_THICKNESS
         push = np.where(d[..., 2] > 0, np.maximum(least / np.maximum(distance, 1e-9), 1.0), 1.0)
         skin[..., rows, :] = centre + d * push[..., None]
-
-    def _turn_head(self, vertices: Array, head: Array, weight: Array) -> Array:
-        """Turn about the neck's pivot: yaw about y, then pitch about x, then roll about z; the neck follows."""
-        if not np.any(head):
-            return vertices
-        yaw, pitch, roll = (np.radians(head[..., i]) for i in range(3))
-        zero, one = np.zeros_like(yaw), np.ones_like(yaw)
-
-        def rows(*nine):
-            return np.stack(nine, axis=-1).reshape(*yaw.shape, 3, 3)
-
-        cy, sy, cp, sp, cr, sr = np.cos(yaw), np.sin(yaw), np.cos(pitch), np.sin(pitch), np.cos(roll), np.sin(roll)
-        turn = (rows(cy, zero, sy, zero, one, zero, -sy, zero, cy)
-                @ rows(one, zero, zero, zero, cp, sp, zero, -sp, cp)
-                @ rows(cr, sr, zero, -sr, cr, zero, zero, zero, one))
-        at = vertices - self._data.head_pivot
-        turned = at @ np.swapaxes(turn, -1, -2)
-        turned[..., 2] += head[..., 3, None]
-        return vertices + weight * (turned - at)
 
     def _level(self, detail: int) -> _Level:
         if isinstance(detail, bool) or detail not in range(MAX_DETAIL + 1):
@@ -371,8 +369,9 @@ def face_names() -> tuple[str, ...]:
     return tuple(_shipped())
 
 
-def load_face(face: str | Path = "akimoto") -> Face:
-    """Return a face by the name of a shipped one, or by the path of a folder or ``face.yaml``.
+def load_face(face: str | Path = "akimoto") -> Face | AvatarFace:
+    """Return a face: a shipped one by name, another by the path of its folder or ``face.yaml``, or an avatar by the
+    path of a file with blendshapes (.glb, .gltf, .vrm).
 
     >>> load_face().name
     'akimoto'
@@ -386,11 +385,27 @@ def load_face(face: str | Path = "akimoto") -> Face:
     if path.is_dir():
         path = path / "face.yaml"
     if not path.is_file():
-        raise InputError(f"face: expected one of {', '.join(shipped)} or the path of a face.yaml, got {str(face)!r}"
-                         f"{nearest(str(face), shipped)}")
+        raise InputError(f"face: expected one of {', '.join(shipped)} or the path of a face.yaml or of a rigged avatar "
+                         f"(.glb), got {str(face)!r}{nearest(str(face), shipped)}")
+    suffix = path.suffix.lower()
+    if suffix in BARE:
+        raise InputError(f"face: {path} has no blendshapes; rig it first: facegen rig {path.name} "
+                         f"--landmarks {path.stem}.yaml -o {path.stem}.glb, then take {path.stem}.glb")
+    if suffix in AVATARS:
+        state = path.stat()
+        return _load_avatar(path.resolve(), state.st_mtime_ns, state.st_size)
     return _load(path.resolve())
 
 
 @cache
 def _load(path: Path) -> Face:
     return Face(read_face(path))
+
+
+@lru_cache(maxsize=8)
+def _load_avatar(path: Path, _changed: int, _size: int) -> AvatarFace:
+    # Here, because an avatar is posed with the help of the base face, which this file loads.
+    from facegen.face.avatar import AvatarFace
+    from facegen.fileio.avatar import load_avatar
+
+    return AvatarFace(load_avatar(path))

@@ -14,6 +14,7 @@ from scipy import sparse
 from facegen.face.attach import Attachment, attach
 from facegen.face.deformer import Array, Deformer, Jaw, Lids, Region, region_weights
 from facegen.face.folds import Fold
+from facegen.face.head import neck_weight
 from facegen.face.landmarks import Landmark, read_landmarks
 from facegen.facs.validate import Entry
 from facegen.facs.yamlfile import read_data
@@ -159,8 +160,7 @@ def read_face(path: Path) -> FaceData:
         raise head["rests_below"].wrong("another place than moves_above")
 
     def head_weight(vertices: Array) -> Array:
-        t = np.clip((vertices - low) @ (high - low) / ((high - low) @ (high - low)), 0.0, 1.0)
-        return (t * t * (3.0 - 2.0 * t))[:, None]
+        return neck_weight(vertices, high, low)
 
     creases = np.empty((0, 2), np.int32)
     if "creases" in top:

@@ -16,7 +16,8 @@ class Mesh:
     """A triangle mesh; +x is the subject's left, +y up, +z forward.
 
     vertices: (n, 3) float64, millimetres for the shipped faces. faces: (m, 3) int32, counter-clockwise seen
-    from outside. ``face_materials`` (m,) and ``face_parts`` (m,) index ``materials`` and ``parts``.
+    from outside. ``face_materials`` (m,) and ``face_parts`` (m,) index ``materials`` and ``parts``. ``colours``: (n, 3)
+    float32, sRGB 0..255 of each vertex, drawn instead of the materials' own; None where there are none.
     """
 
     vertices: NDArray[np.float64]
@@ -25,6 +26,7 @@ class Mesh:
     face_materials: NDArray[np.int32]
     parts: tuple[str, ...]
     face_parts: NDArray[np.int32]
+    colours: NDArray[np.float32] | None = None
 
     def __post_init__(self) -> None:
         for name, dtype in (("vertices", np.float64), ("faces", np.int32), ("face_materials", np.int32),
@@ -32,6 +34,14 @@ class Mesh:
             array = np.array(getattr(self, name), dtype=dtype, order="C")    # a copy: the caller keeps theirs
             array.flags.writeable = False
             object.__setattr__(self, name, array)
+        if self.colours is not None:
+            colours = np.array(self.colours, dtype=np.float32, order="C")
+            if colours.shape != self.vertices.shape:
+                raise InputError(f"colours: expected shape {self.vertices.shape}, got {colours.shape}")
+            if not ((colours >= 0) & (colours <= 255)).all():
+                raise InputError("colours: expected sRGB values 0..255, got others")
+            colours.flags.writeable = False
+            object.__setattr__(self, "colours", colours)
         m = len(self.faces)
         if self.vertices.ndim != 2 or self.vertices.shape[1] != 3:
             raise InputError(f"vertices: expected shape (n, 3), got {self.vertices.shape}")
@@ -71,7 +81,10 @@ class Mesh:
 
 
 def merge(meshes: Sequence[Mesh]) -> Mesh:
-    """Return the meshes side by side as one; equal part and material names become one entry."""
+    """Return the meshes side by side as one; equal part and material names become one entry.
+
+    Colours of vertices are kept if all meshes have them.
+    """
     if not meshes:
         raise InputError("meshes: expected at least one mesh, got none")
     parts = tuple(dict.fromkeys(p for m in meshes for p in m.parts))
@@ -86,4 +99,5 @@ def merge(meshes: Sequence[Mesh]) -> Mesh:
         np.concatenate(face_materials),
         parts,
         np.concatenate([np.array([parts.index(p) for p in m.parts], int)[m.face_parts] for m in meshes]),
+        None if any(m.colours is None for m in meshes) else np.concatenate([m.colours for m in meshes]),
     )

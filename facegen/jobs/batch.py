@@ -12,6 +12,7 @@ from typing import Any
 
 from facegen import __version__
 from facegen.errors import FileError, InputError
+from facegen.face.face import load_face
 from facegen.facs.yamlfile import parse_json, read_data
 from facegen.fileio.textfile import make_folder, remove_drafts, save_text
 from facegen.jobs.crew import Crew
@@ -86,7 +87,8 @@ def run_batch(jobs: str | Path | Mapping[str, Any] | Batch, folder: str | Path, 
         raise
     try:
         if not alone:
-            warm(chosen)
+            for coloured in {load_face(face).mesh(0).colours is not None for face in {p.face for p in batch.pictures}}:
+                warm(chosen, coloured=coloured)
         report = run(tasks, executor=executor, workers=workers, step=step)
     finally:
         remove_drafts(root / file for task in tasks for file in (task.file, task.mask) if file)

@@ -9,9 +9,10 @@ from pathlib import Path
 from typing import Any
 
 from facegen.data import meshes_dir, tables_dir
+from facegen.face.face import AVATARS, load_face
 from facegen.facs.yamlfile import read_data
 
-TABLES = ("action_units.yaml", "deformations.yaml", "expressions.yaml", "lights.yaml")
+TABLES = ("action_units.yaml", "deformations.yaml", "expressions.yaml", "lights.yaml", "vocabularies.yaml")
 
 
 def digest_of(data: Any) -> str:
@@ -26,14 +27,22 @@ def table_digests() -> dict[str, str]:
     return {name: file_digest(tables_dir() / name) for name in TABLES}
 
 
-@cache
-def face_digest(face: str) -> str:
-    """Return the SHA-256 of a face's files. Read once."""
+def face_digest(face: str, *, fresh: bool = False) -> str:
+    """Return the SHA-256 of a face's files. A parametric face's are read once, unless a ``fresh`` look is asked for."""
+    if Path(face).suffix.lower() in AVATARS:
+        return load_face(face).digest               # with the buffers of a .gltf, as the reader knows them
+    return _read(face) if fresh else kept_digest(face)
+
+
+def _read(face: str) -> str:
     return digest_of([file_digest(one) for one in face_files(face)])
 
 
+kept_digest = cache(_read)
+
+
 def face_files(face: str) -> list[Path]:
-    """Return the files of a face, by name or path: its ``face.yaml`` and all that it names."""
+    """Return the files of a parametric face, by name or path: its ``face.yaml`` and all that it names."""
     path = meshes_dir() / face / "face.yaml"
     if not path.is_file():
         path = Path(face)

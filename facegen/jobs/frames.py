@@ -24,7 +24,8 @@ from facegen.animation.clip import Clip, frame_time
 from facegen.animation.easing import min_jerk
 from facegen.data import tables_dir
 from facegen.errors import FileError, InputError, TableError
-from facegen.face.face import Face, face_names, load_face
+from facegen.face.face import face_names, load_face
+from facegen.face.rig import Rig
 from facegen.facs.deformation import Deformation
 from facegen.facs.expressions import Resolution, resolve
 from facegen.facs.yamlfile import read_data
@@ -32,9 +33,10 @@ from facegen.fileio.images import without_full_alpha, write_whole
 from facegen.fileio.textfile import make_folder, save_text
 from facegen.fileio.video import FORMATS, check_film, save_video
 from facegen.geometry.camera import Camera, check_view, frame
-from facegen.jobs.digests import digest_of, face_files, file_digest
+from facegen.jobs.digests import digest_of, face_digest, file_digest
 from facegen.jobs.runner import Report, run, shared
 from facegen.render.backends import choose, warm
+from facegen.render.dress import portrait
 from facegen.render.render import Renderer
 from facegen.render.request import check_look, check_size, neutral_mesh
 
@@ -62,8 +64,8 @@ class Shot:
     @cached_property
     def fingerprint(self) -> str:
         """A digest of everything here, and of the tables and the mesh."""
-        files = (*sorted(tables_dir().glob("*.yaml")), *face_files(self.face))
-        return digest_of([__version__, _plain(self), [file_digest(path) for path in files]])
+        files = [file_digest(path) for path in sorted(tables_dir().glob("*.yaml"))]
+        return digest_of([__version__, _plain(self), files, face_digest(self.face, fresh=True)])
 
     def prepare(self) -> Callable[[int], NDArray[np.uint8]]:
         """Return what draws frame k; made once in a worker."""
@@ -122,9 +124,10 @@ def save_clip(clip: Clip, path: str | os.PathLike[str], *, fps: float = 25.0, si
     count = clip.frames(fps)
     rig, name, mesh, level, chosen = _prepared(face, size, view, detail, background, renderer, count)
     for raw in clip.raw:
-        rig.controls(raw)               # a point that this face lacks is said now
+        rig.check(resolve(raw))         # a point that this face lacks is said now
     target = _Target(Path(path), size, fps)
-    camera = frame(mesh.vertices, _reach(rig, clip, frame(mesh.vertices, size=size, view=view)), size=size, view=view)
+    head = portrait(rig, mesh.vertices)
+    camera = frame(head, _reach(rig, clip, frame(head, size=size, view=view)), size=size, view=view)
     return target.fill(Shot(clip, float(fps), count, name, level, background, chosen, (camera,)), workers, step)
 
 
@@ -153,12 +156,13 @@ def save_turn(what: Any, path: str | os.PathLike[str], *, seconds: float = 4.0, 
     rig, name, mesh, level, chosen = _prepared(face, size, (yaws[0], pitch), detail, background, renderer, count)
     posed = rig.pose(pose, detail=level)
     target = _Target(Path(path), size, fps)
-    cameras = _orbit(np.concatenate([mesh.vertices, posed]), size, [(yaw, pitch) for yaw in yaws])
+    reach = np.concatenate([portrait(rig, mesh.vertices), portrait(rig, posed)])
+    cameras = _orbit(reach, size, [(yaw, pitch) for yaw in yaws])
     return target.fill(Shot(pose, float(fps), count, name, level, background, chosen, cameras), workers, step)
 
 
 def _prepared(face: object, size: tuple[int, int], view: tuple[float, float], detail: int | None, background: Any,
-              renderer: str, count: int) -> tuple[Face, str, Any, int, str]:
+              renderer: str, count: int) -> tuple[Rig, str, Any, int, str]:
     """Return the checked face, its name, its neutral mesh, the level of detail and the renderer to use."""
     if not isinstance(face, (str, os.PathLike)):
         raise InputError(f"face: expected a name or a path, which every process can load, got {type(face).__name__}")
@@ -172,13 +176,13 @@ def _prepared(face: object, size: tuple[int, int], view: tuple[float, float], de
     return rig, name, mesh, int(level or 0), chosen
 
 
-def _reach(rig: Face, clip: Clip, camera: Camera) -> NDArray[np.float64]:
+def _reach(rig: Rig, clip: Clip, camera: Camera) -> NDArray[np.float64]:
     """Return the vertices (k, 3) that go farthest left, right, up and down in the picture during a clip."""
     count = min(_TRIES // 2, 10 * int(clip.duration) + 10)
     times = [*np.linspace(0.0, clip.duration, count), *clip.corners[:: 1 + len(clip.corners) // (_TRIES // 2)]]
     found = []
     for t in times:
-        vertices = rig.pose(clip.at(float(t)), detail=0)
+        vertices = portrait(rig, rig.pose(clip.at(float(t)), detail=0))
         points = camera.project(vertices)[:, :2]
         found.append(vertices[np.concatenate([points.argmin(axis=0), points.argmax(axis=0)])])
     return np.concatenate(found)
@@ -223,7 +227,7 @@ class _Target:
         paths = [self.folder / f"frame_{k:05d}.png" for k in range(1, shot.frames + 1)]
         tasks = [FrameTask(shot, k, path, shot.fingerprint) for k, path in enumerate(paths)]
         if workers > 1:
-            warm(shot.renderer)
+            warm(shot.renderer, coloured=load_face(shot.face).mesh(shot.detail).colours is not None)
         report = run(tasks, workers=workers, step=step)
         if self.is_film:
             save_video(_Frames(paths), self.path, fps=self.fps)

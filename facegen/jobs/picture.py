@@ -12,7 +12,8 @@ import numpy as np
 
 from facegen import __version__
 from facegen.errors import FileError, InputError
-from facegen.face.face import Face, load_face
+from facegen.face.face import load_face
+from facegen.face.rig import Rig
 from facegen.facs.deformation import deformation_from_dict
 from facegen.facs.notation import canonical
 from facegen.fileio.images import save_image, save_mask
@@ -21,13 +22,15 @@ from facegen.geometry.camera import Camera, frame
 from facegen.jobs.digests import digest_of, face_digest, table_digests
 from facegen.jobs.runner import shared
 from facegen.jobs.spec import Picture, Settings, thawed
+from facegen.render.dress import portrait
 from facegen.render.lighting import load_light
 from facegen.render.passes import Points, render_passes
 from facegen.render.passfiles import camera_data
 from facegen.render.render import Renderer
 
 IMAGES, MASKS, LABELS = "images", "masks", "labels"
-DRAWN_BY = ("action_units.yaml", "deformations.yaml", "lights.yaml")     # tables that a worker itself reads
+# Tables that a worker itself reads.
+DRAWN_BY = ("action_units.yaml", "deformations.yaml", "lights.yaml", "vocabularies.yaml")
 
 
 @dataclass(frozen=True)
@@ -94,7 +97,7 @@ class PictureTask:
         renderer = shared((self.group, self.settings), lambda: self._renderer(face, None))
         pose = dict(p.units) if p.deformation is None else deformation_from_dict(thawed(p.deformation))
         vertices = face.pose(pose, detail=renderer.detail)
-        camera = frame(renderer.mesh.vertices, vertices, size=p.size, view=p.view,
+        camera = frame(portrait(face, renderer.mesh.vertices), portrait(face, vertices), size=p.size, view=p.view,
                        orthographic=self.settings.orthographic)
         if (camera.scale, camera.offset) != (renderer.camera.scale, renderer.camera.offset):
             renderer = self._renderer(face, camera)     # the pose leaves the neutral's frame
@@ -112,7 +115,7 @@ class PictureTask:
         label["fingerprint"] = self.fingerprint
         save_text(json.dumps(label, ensure_ascii=False) + "\n", self.output)
 
-    def _renderer(self, face: Face, camera: Camera | None) -> Renderer:
+    def _renderer(self, face: Rig, camera: Camera | None) -> Renderer:
         p, s = self.picture, self.settings
         return Renderer(face, size=p.size, view=p.view, detail=s.detail, background=p.background,
                         orthographic=s.orthographic, camera=camera, scene=load_light(p.light), renderer=s.renderer,

@@ -40,6 +40,7 @@ SETTINGS = ("format", "detail", "renderer", "orthographic", "masks", "feature_po
 _NOBODY = ("nobody", "none")        # as a person: the common tables
 _RANGES = ("yaw", "pitch", "intensity")
 _MOST_UNITS = 12
+_MOST_LOOKED_AT = 300       # poses of units that a face is asked about: a million drawn ones would take an hour
 
 
 @dataclass(frozen=True)
@@ -106,12 +107,15 @@ class _Reader:
     def __init__(self, folder: Path, source: str) -> None:
         self.folder, self.source = folder, source
         self._meanings: dict[Any, Resolution] = {}
+        self._points = False
         self._fitting: set[Any] = set()
+        self._warnings: list[str] = []      # of faces that cannot show all of a pose
 
     def batch(self, top: Entry) -> Batch:
         """Return the whole batch."""
         fields = top.fields(optional=(*LISTS, *SETTINGS, "pictures", "products", "random"))
         settings = self._settings(fields)
+        self._points = settings.feature_points
         own = {key: fields[key] for key in LISTS if key in fields}
         sections: list[tuple[int, Callable[[], Iterator[Picture]]]] = []
         if "poses" in own:
@@ -135,8 +139,8 @@ class _Reader:
                            "several batches")
         pictures = [picture for _, section in sections for picture in section()]
         # Said twice is drawn once; drawn ones may repeat.
-        warnings = (warning for meaning in self._meanings.values() for warning in meaning.warnings)
-        return Batch(settings, tuple(dict.fromkeys(pictures)), tuple(dict.fromkeys(warnings)))
+        warnings = [warning for meaning in self._meanings.values() for warning in meaning.warnings]
+        return Batch(settings, tuple(dict.fromkeys(pictures)), tuple(dict.fromkeys([*warnings, *self._warnings])))
 
     def _settings(self, fields: Mapping[str, Entry]) -> Settings:
         asked: dict[str, Any] = {}
@@ -233,7 +237,10 @@ class _Reader:
             face = name if name in face_names() else str((self.folder / name).resolve())
             if face != name and not Path(face).exists():
                 entry.choice(face_names(), "face")
-            self._checked(entry, lambda: load_face(face))
+            rig = self._checked(entry, lambda: load_face(face))
+            if self._points and not hasattr(rig, "feature_point_places"):
+                raise entry.fail(f"feature_points: {rig.name} is an avatar and has none, only landmarks; leave "
+                                 "feature_points out or take the base face")
             return face
         if key == "light":
             return entry.choice(light_names(), "light")
@@ -256,8 +263,8 @@ class _Reader:
         pose, entry = wish["pose"]
         said = _frozen(pose)
         meaning = self._meaning(said, pose, value["person"], value["intensity"], wish)
-        if not meaning.units and (said, value["face"]) not in self._fitting:
-            self._checked(entry, lambda: load_face(value["face"]).controls(meaning.deformation))
+        if (said, value["face"]) not in self._fitting and (not meaning.units or len(self._fitting) < _MOST_LOOKED_AT):
+            self._warnings += self._checked(entry, lambda: load_face(value["face"]).check(meaning))
             self._fitting.add((said, value["face"]))
         raw = None if meaning.kind != "deformation" else _frozen(meaning.deformation.as_dict())
         return Picture(pose=pose if isinstance(pose, str) else _spoken(pose), kind=meaning.kind, caption=meaning.name,

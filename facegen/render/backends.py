@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable
+from dataclasses import replace
 from importlib import import_module
 from importlib.util import find_spec
 from typing import Protocol
@@ -57,10 +58,14 @@ def choose(renderer: str, *, pictures: int | None = None, pixels: int = 0, now: 
     return renderer
 
 
-def warm(name: str) -> None:
-    """Have a renderer compiled, which happens once on a machine: before several processes do it at the same time."""
+def warm(name: str, *, coloured: bool = False) -> None:
+    """Have a renderer compiled, which happens once on a machine: before several processes do it at the same time.
+
+    coloured: for vertices with colours of their own, which are drawn by code of their own.
+    """
     if name == "fast":
         triangle = Mesh.of(np.eye(3), [[0, 1, 2]])
+        triangle = replace(triangle, colours=np.zeros((3, 3))) if coloured else triangle
         load(name)(triangle, frame(triangle.vertices, size=(32, 32)), Scene(), Look()).draw(triangle.vertices)
 
 

@@ -25,7 +25,16 @@ from facegen.render.occlusion import (
 )
 from facegen.render.request import Look, available_cores
 from facegen.render.scene import Scene
-from facegen.render.shading import CAVITY, DARKEST, light_directions, material_rows, srgb_table, to_srgb, unit
+from facegen.render.shading import (
+    CAVITY,
+    DARKEST,
+    light_directions,
+    material_rows,
+    srgb_table,
+    to_srgb,
+    unit,
+    vertex_albedo,
+)
 from facegen.render.soft import background_rows
 from facegen.render.vertexlight import VertexLight
 
@@ -51,6 +60,7 @@ class FastBackend:
         self._view = np.array([*camera.offset, 1 / focal, camera.orthographic], np.float32)
         self._material = material_rows(neutral, scene)
         self._inside = len(neutral.materials)
+        self._colours = vertex_albedo(neutral)
         towards = light_directions(scene)
         self._lamps = np.array([(*way, *lamp.colour, lamp.highlight)
                                 for way, lamp in zip(towards, scene.lights, strict=True)], np.float32).reshape(-1, 7)
@@ -96,8 +106,9 @@ class FastBackend:
             kernels.draw_bands(
                 thread, len(self._starts) - 1, self._threads, items, self._starts, self._columns, vertices,
                 self._faces, self._proj, self._snapped, self._depth, self._kind, self._inside, self._cam,
-                self.look.flat, self._attributes, planes, ready, self._material, self._lamps, self._sky, self._view,
-                _powers(), srgb_table(), self._behind, self._transparent, picture.view(np.uint32)[..., 0])
+                self.look.flat, self._attributes, self._colours, planes, ready, self._material, self._lamps,
+                self._sky, self._view, _powers(), srgb_table(), self._behind, self._transparent,
+                picture.view(np.uint32)[..., 0])
 
         self._share_out(bands)
         return picture

@@ -36,7 +36,7 @@ from facegen.geometry.normals import face_normals, vertex_normals
 from facegen.render.glsl import fragment_shader, vertex_shader
 from facegen.render.request import Look
 from facegen.render.scene import Scene
-from facegen.render.shading import material_rows, to_srgb
+from facegen.render.shading import material_rows, to_srgb, vertex_albedo
 from facegen.render.soft import background_rows
 from facegen.render.vertexlight import VertexLight
 
@@ -294,29 +294,35 @@ class GlBackend:
 
     All that is constant stays on the card (or in the driver's memory); a draw replaces the vertices. Raises
     InputError where OpenGL cannot be had, the picture is larger than it can draw, or the scene has more lights than
-    `MAX_LIGHTS`.
+    `MAX_LIGHTS` (three fewer where vertices have colours).
     """
 
     def __init__(self, neutral: Mesh, camera: Camera, scene: Scene, look: Look) -> None:
-        if len(scene.lights) > MAX_LIGHTS:
-            raise InputError(f"scene: renderer='gl' draws up to {MAX_LIGHTS} lights, "
+        most = MAX_LIGHTS if neutral.colours is None else MAX_LIGHTS - 3
+        if len(scene.lights) > most:
+            raise InputError(f"scene: renderer='gl' draws up to {most} lights"
+                             f"{'' if most == MAX_LIGHTS else ' where vertices have colours'}, "
                              f"got {len(scene.lights)}; {_OTHERS}")
         self.neutral, self.camera, self.scene, self.look = neutral, camera, scene, look
         self._turn = threading.Lock()
         self._corners, faces, material = _expanded(neutral, look.flat)
         shares = 1 + len(scene.lights)
-        slots = _used_slots(shares + 1)
+        albedo = vertex_albedo(neutral)
+        tinted = albedo is not None
+        slots = _used_slots(shares + 1 + (3 if tinted else 0))
         # Position, normal, light shares, material and what the last attribute has over, as the card reads them.
         self._data = np.zeros((len(self._corners), 6 + sum(size for _, size in slots)), np.float32)
         self._own_light = self._data[:, 6:6 + shares]
         self._data[:, 6 + shares] = material
+        if tinted:
+            self._data[:, 7 + shares:10 + shares] = albedo[self._corners]
         self._light = VertexLight(neutral, camera, scene, look)
         if self._light.still:
             self._own_light[:] = self._light.of(neutral.vertices, None)[self._corners]
         self._behind = background_rows(look.background, scene, camera.height)
         materials = material_rows(neutral, scene)
-        shaders = (vertex_shader([size for _, size in slots], shares, materials),
-                   fragment_shader(scene, materials[-1, :3]))
+        shaders = (vertex_shader([size for _, size in slots], shares, materials, tinted=tinted),
+                   fragment_shader(scene, materials[-1, :3], tinted=tinted))
         with _current() as context:
             _check_size(camera, context.largest)
             framebuffer = _kept(context.framebuffers, (camera.width, camera.height), _Framebuffer)

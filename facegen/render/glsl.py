@@ -21,7 +21,7 @@ uniform mat4 V;
 uniform mat4 P;
 centroid out vec3 smooth_normal;
 {outputs}
-flat out vec4 albedo_specular;
+{tint_out}flat out vec4 albedo_specular;
 flat out vec4 wrap_shininess;
 flat out vec2 catch_lift;
 
@@ -33,6 +33,7 @@ void main() {{
     gl_Position = P * (V * vec4(position, 1.0));
     smooth_normal = normal;
     {pass_on}
+    {tint}
     int material = int({material} + 0.5);
     albedo_specular = ALBEDO_SPECULAR[material];
     wrap_shininess = WRAP_SHININESS[material];
@@ -45,7 +46,7 @@ _FRAGMENT = """#version 330 core
 uniform vec3 lens;      // the target's place in pixels, and one over the focal length (0: parallel rays)
 centroid in vec3 smooth_normal;
 {inputs}
-flat in vec4 albedo_specular;
+{tint_in}flat in vec4 albedo_specular;
 flat in vec4 wrap_shininess;
 flat in vec2 catch_lift;
 layout(location = 0) out vec4 colour;
@@ -76,7 +77,7 @@ void main() {{
         float share[{shares}] = float[]({share_list});
         if (catch_lift.y > 0.0)
             for (int k = 0; k < {shares}; k++) share[k] = pow(max(share[k], 0.0), 1.0 - catch_lift.y);
-        vec3 albedo = albedo_specular.rgb;
+        vec3 albedo = {albedo};
         diffuse = ambient(albedo, {darkest} + {rest} * pow(max(share[0], 0.0), {cavity}));
         shine = vec3(0.0);
         {lamps}
@@ -94,11 +95,11 @@ void main() {{
 """
 
 
-def vertex_shader(slots: Sequence[int], shares: int, materials: NDArray) -> str:
+def vertex_shader(slots: Sequence[int], shares: int, materials: NDArray, *, tinted: bool = False) -> str:
     """Return the vertex shader.
 
     slots: floats of each attribute after position and normal; they hold ``shares`` light shares, then the index of
-    the material. materials: (k, 10), see `shading.material_rows`.
+    the material, then if ``tinted`` the vertex's own albedo. materials: (k, 10), see `shading.material_rows`.
     """
     values = [f"extra_{a}.{'xyzw'[c]}" for a, size in enumerate(slots) for c in range(size)]
     return _VERTEX.format(
@@ -106,6 +107,8 @@ def vertex_shader(slots: Sequence[int], shares: int, materials: NDArray) -> str:
         outputs=_packs("out", shares),
         pass_on="\n    ".join(f"{place} = {value};" for place, value in zip(_places(shares), values, strict=False)),
         material=values[shares],
+        tint_out="centroid out vec3 tint;\n" if tinted else "",
+        tint=f"tint = vec3({', '.join(values[shares + 1:shares + 4])});" if tinted else "",
         count=len(materials),
         albedo_specular=_list(materials[:, [0, 1, 2, 6]]),
         wrap_shininess=_list(materials[:, [3, 4, 5, 7]]),
@@ -113,12 +116,13 @@ def vertex_shader(slots: Sequence[int], shares: int, materials: NDArray) -> str:
     )
 
 
-def fragment_shader(scene: Scene, inside: NDArray) -> str:
+def fragment_shader(scene: Scene, inside: NDArray, *, tinted: bool = False) -> str:
     """Return the fragment shader; ``inside`` (3,) is the linear colour of back faces."""
     shares = 1 + len(scene.lights)
     lamps = [f"lamp({_vector(way)}, {_vector(light.colour)}, {_number(light.highlight)}, share[{k}]);"
              for k, (way, light) in enumerate(zip(shading.light_directions(scene), scene.lights, strict=True), start=1)]
     return _FRAGMENT.format(
+        tint_in="centroid in vec3 tint;\n" if tinted else "", albedo="tint" if tinted else "albedo_specular.rgb",
         inputs=_packs("in", shares), shares=shares, share_list=", ".join(_places(shares)),
         lamps="\n        ".join(lamps),
         sky=_vector(scene.sky), ground=_vector(scene.ground), window=_vector(shading.unit(scene.window)),

@@ -53,7 +53,9 @@ _STEEP = 2.0**40
 # ... and one gentler than this cannot leave 32 bits within a block.
 _GENTLE = 2.0**20
 
-# Rows of a chunk's flat work array. The lights' shares come last, as many as there are.
+# Rows of a chunk's flat work array. The lights' shares come last, as many as there are, and after them red, green and
+# blue of the albedo where vertices have colours. Where they have none, ``colours`` is None to the compiler, which
+# leaves all that out.
 WORK_ROWS = 17
 (_NX, _NY, _NZ, _VX, _VY, _VZ, _NV, _FREE, _R, _G, _B, _SR, _SG, _SB, _X, _Y, _REACH) = (
     np.uint64(CHUNK * row) for row in range(WORK_ROWS))
@@ -318,7 +320,7 @@ def _turned(cam, x, y, z):
 
 
 @njit(**OPTIONS)
-def _gather(count, kind, entry, target, top, work, faces, attributes, planes, material, flat, back, powers):
+def _gather(count, kind, entry, target, top, work, faces, attributes, colours, planes, material, flat, back, powers):
     """Interpolate normal and light shares of a chunk's points into the work array."""
     shares = np.uint64(attributes.shape[1] - 4)
     power, lifted = np.float32(1) - material[kind, 9], material[kind, 9] != 0.0
@@ -343,6 +345,14 @@ def _gather(count, kind, entry, target, top, work, faces, attributes, planes, ma
             work[_NY + i] = sign * (u * attributes[a, _P1] + v * attributes[b, _P1] + w * attributes[c, _P1])
             work[_NZ + i] = sign * (u * attributes[a, _P2] + v * attributes[b, _P2] + w * attributes[c, _P2])
         work[_X + i], work[_Y + i] = x, y
+        if colours is not None:
+            row = _REACH + shares * _CHUNK + i
+            if back:
+                for band in range(_P3):
+                    work[row + band * _CHUNK] = material[kind, band]
+            else:
+                for band in range(_P3):
+                    work[row + band * _CHUNK] = u * colours[a, band] + v * colours[b, band] + w * colours[c, band]
         openness = u * attributes[a, _P3] + v * attributes[b, _P3] + w * attributes[c, _P3]
         for k in range(shares):
             at = _P4 + k
@@ -363,9 +373,10 @@ def _gather(count, kind, entry, target, top, work, faces, attributes, planes, ma
 
 
 @njit(**OPTIONS)
-def _light(count, look, lamps, sky, view, work):
+def _light(count, look, lamps, sky, view, colours, work):
     """Turn a chunk's normals and shares into colours, rows _R, _G, _B: see `shading.shade`."""
     count = np.uint64(count)
+    own = _REACH + np.uint64(len(lamps)) * _CHUNK
     one, zero, half = np.float32(1), np.float32(0), np.float32(0.5)
     ortho = view[3] != 0.0
     for i in range(count):
@@ -382,9 +393,13 @@ def _light(count, look, lamps, sky, view, work):
         work[_NV + i] = nx * vx + ny * vy + nz * vz
         up, free = half + half * ny, work[_FREE + i]
         lost = np.float32(BOUNCE) * (one - free)
-        work[_R + i] = (sky[0] + sky[3] * up) * free / (one - look[0] * lost)
-        work[_G + i] = (sky[1] + sky[4] * up) * free / (one - look[1] * lost)
-        work[_B + i] = (sky[2] + sky[5] * up) * free / (one - look[2] * lost)
+        if colours is None:
+            red, green, blue = look[0], look[1], look[2]
+        else:
+            red, green, blue = work[own + i], work[own + _CHUNK + i], work[own + _P2 * _CHUNK + i]
+        work[_R + i] = (sky[0] + sky[3] * up) * free / (one - red * lost)
+        work[_G + i] = (sky[1] + sky[4] * up) * free / (one - green * lost)
+        work[_B + i] = (sky[2] + sky[5] * up) * free / (one - blue * lost)
         work[_SR + i] = zero
         work[_SG + i] = zero
         work[_SB + i] = zero
@@ -434,6 +449,8 @@ def _light(count, look, lamps, sky, view, work):
     for c in range(3):
         row, shine_row, albedo = _R + np.uint64(c) * _CHUNK, _SR + np.uint64(c) * _CHUNK, look[c]
         for i in range(count):
+            if colours is not None:
+                albedo = work[own + np.uint64(c) * _CHUNK + i]
             value = work[row + i] * albedo + work[shine_row + i]
             above = max(value - shoulder, zero)
             work[row + i] = min(value, shoulder) + above * room / (above + room)
@@ -441,8 +458,8 @@ def _light(count, look, lamps, sky, view, work):
 
 @njit(**OPTIONS)
 def draw_bands(start, stop, step, items, starts, columns, vertices, faces, proj, snapped, depth, kind, inside, cam,
-               flat, attributes, planes, ready, material, lamps, sky, view, powers, encode, behind, transparent,
-               picture):
+               flat, attributes, colours, planes, ready, material, lamps, sky, view, powers, encode, behind,
+               transparent, picture):
     """Draw the bands start, start + step, ... before stop over picture (h, w) uint32, which holds the background."""
     height, width = picture.shape
     row_blocks = (width + 3) >> 2
@@ -451,7 +468,7 @@ def draw_bands(start, stop, step, items, starts, columns, vertices, faces, proj,
     kinds = len(material)
     entry, target = np.empty((kinds, CHUNK), np.int32), np.empty((kinds, CHUNK), np.int32)
     filled = np.zeros(kinds, np.int64)
-    work = np.empty((WORK_ROWS + len(lamps)) * CHUNK, np.float32)
+    work = np.empty((WORK_ROWS + len(lamps) + 3) * CHUNK, np.float32)
     for band in range(start, stop, step):
         if starts[band] == starts[band + 1]:
             continue
@@ -485,12 +502,12 @@ def draw_bands(start, stop, step, items, starts, columns, vertices, faces, proj,
                     if not ready[np.uint64(t)]:
                         _prepare(t, vertices, faces, proj, cam, flat, planes, ready)
                     if n + _P1 == _CHUNK:
-                        _flush(own, filled, entry, target, top, row_blocks, work, faces, attributes, planes,
+                        _flush(own, filled, entry, target, top, row_blocks, work, faces, attributes, colours, planes,
                                material, flat, inside, powers, lamps, sky, view, colour)
         for own in range(kinds):
             if filled[own]:
-                _flush(own, filled, entry, target, top, row_blocks, work, faces, attributes, planes, material, flat,
-                       inside, powers, lamps, sky, view, colour)
+                _flush(own, filled, entry, target, top, row_blocks, work, faces, attributes, colours, planes,
+                       material, flat, inside, powers, lamps, sky, view, colour)
         _finish(colour, row_blocks, top, bottom, left, right, behind, encode, transparent, picture)
 
 
@@ -511,13 +528,13 @@ def _group(buffer, p, sample, t, own, kind, left_over):
 
 
 @njit(**OPTIONS)
-def _flush(kind, filled, entry, target, top, row_blocks, work, faces, attributes, planes, material, flat, inside,
-           powers, lamps, sky, view, colour):
+def _flush(kind, filled, entry, target, top, row_blocks, work, faces, attributes, colours, planes, material, flat,
+           inside, powers, lamps, sky, view, colour):
     """Shade the chunk of a material and add it to the band's colours."""
     count = filled[kind]
-    _gather(count, kind, entry[kind], target[kind], top, work, faces, attributes, planes, material, flat,
+    _gather(count, kind, entry[kind], target[kind], top, work, faces, attributes, colours, planes, material, flat,
             kind == inside, powers)
-    _light(count, material[kind], lamps, sky, view, work)
+    _light(count, material[kind], lamps, sky, view, colours, work)
     places, pitch = target[kind], 16 * row_blocks
     for i in range(np.uint64(count)):
         place = places[i]

@@ -56,8 +56,8 @@ def check_wireframe(wireframe: Any, thing: Mesh | Rig, mesh: Mesh, detail: int |
     _check_number("wireframe.opacity", look.opacity, 0.0, 1.0)
     check_choice("wireframe.lines", look.lines, LINES)
     if look.lines == "cage" and not hasattr(thing, "cage_sides"):
-        raise InputError(f"wireframe.lines: 'cage' needs a face, which has one, got a {type(thing).__name__}; "
-                         "take 'mesh'")
+        raise InputError("wireframe.lines: 'cage' needs a face that has one, such as the base face; take 'mesh' for "
+                         f"{getattr(thing, 'name', None) or 'a ' + type(thing).__name__}")
     sides = thing.cage_sides(detail) if look.lines == "cage" else np.ones(mesh.faces.shape, bool)
     if look.parts is not None:
         if isinstance(look.parts, str):

@@ -18,6 +18,7 @@ from facegen.errors import InputError
 from facegen.geometry.camera import Camera, check_view, frame
 from facegen.geometry.mesh import Mesh
 from facegen.geometry.normals import face_normals, vertex_normals
+from facegen.render.dress import portrait
 from facegen.render.request import (
     SHADINGS,
     Rig,
@@ -105,7 +106,8 @@ def render_passes(thing: Mesh | Rig, pose: Any = None, *, passes: Sequence[str] 
     for name in wanted:
         _check_possible(name, thing, mesh)
     vertices = posed_vertices(thing, pose, mesh, level, person=person, intensity=intensity)
-    camera = camera or frame(mesh.vertices, vertices, size=size, view=view, orthographic=orthographic)
+    camera = camera or frame(portrait(thing, mesh.vertices), portrait(thing, vertices), size=size, view=view,
+                             orthographic=orthographic)
     check_in_front("pose", vertices, mesh.faces, camera)
     posed = mesh.with_vertices(vertices)
     found = Passes(camera, posed)

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from facegen.geometry.camera import Camera, check_view, frame
 from facegen.geometry.mesh import Mesh
 from facegen.render.backends import choose, load
+from facegen.render.dress import dressed, portrait
 from facegen.render.overlay import Wireframe, check_wireframe, draw_wireframe
 from facegen.render.request import Rig, check_in_front, check_look, check_size, neutral_mesh, posed_vertices
 from facegen.render.scene import Scene
@@ -58,10 +59,11 @@ class Renderer:
         self.thing = thing
         self.mesh, self.detail = neutral_mesh(thing, detail=detail, size=size, view=view, orthographic=orthographic,
                                               flat=look.flat, camera=camera)
-        self.camera = camera or frame(self.mesh.vertices, around, size=size, view=view, orthographic=orthographic)
+        self.camera = camera or frame(portrait(thing, self.mesh.vertices), around, size=size, view=view,
+                                       orthographic=orthographic)
         self.renderer = name
         self._lines = check_wireframe(wireframe, thing, self.mesh, self.detail)
-        self._backend = load(name)(self.mesh, self.camera, scene or Scene(), look)
+        self._backend = load(name)(self.mesh, self.camera, dressed(scene or Scene(), thing, self.mesh), look)
 
     def draw(self, pose: Any = None, *, person: Any = None, intensity: float = 1.0) -> NDArray[np.uint8]:
         """Return the picture (height, width, 4) uint8, sRGB with straight alpha, of a pose.
@@ -97,9 +99,11 @@ def render(thing: Mesh | Rig, pose: Any = None, *, size: int | tuple[int, int] =
                                flat=look.flat, camera=camera)
     lines = check_wireframe(wireframe, thing, mesh, level)
     vertices = posed_vertices(thing, pose, mesh, level, person=person, intensity=intensity)
-    camera = camera or frame(mesh.vertices, vertices, size=size, view=view, orthographic=orthographic)
+    camera = camera or frame(portrait(thing, mesh.vertices), portrait(thing, vertices), size=size, view=view,
+                             orthographic=orthographic)
     check_in_front("pose", vertices, mesh.faces, camera)
-    return _with_lines(load(name)(mesh, camera, scene or Scene(), look).draw(vertices), vertices, mesh, camera, lines)
+    backend = load(name)(mesh, camera, dressed(scene or Scene(), thing, mesh), look)
+    return _with_lines(backend.draw(vertices), vertices, mesh, camera, lines)
 
 
 def _with_lines(picture: NDArray[np.uint8], vertices: NDArray, mesh: Mesh, camera: Camera,

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from facegen.errors import InputError, nearest
 from facegen.geometry.camera import Camera, frame
 from facegen.geometry.mesh import Mesh
+from facegen.render.dress import portrait
 from facegen.render.zbuffer import twice_area
 
 SMALLEST, LARGEST = 32, 4096
@@ -27,7 +28,10 @@ _TRIANGLE_PIXELS = 26.0
 
 @runtime_checkable
 class Rig(Protocol):
-    """Anything that can be posed: a mesh at a detail (subdivision level), and vertices for a pose."""
+    """Anything that can be posed: a mesh at a detail (subdivision level), and vertices for a pose.
+
+    It may also bring ``colours`` (material -> sRGB 0..255) and ``focus`` (the vertices that a portrait frames).
+    """
 
     def mesh(self, detail: int) -> Mesh:
         """Return the neutral mesh."""
@@ -192,7 +196,7 @@ def _fitting_detail(rig: Rig, size: tuple[int, int], view: tuple[float, float], 
     mesh = rig.mesh(0)
     if not len(mesh.faces):
         return 0
-    camera = camera or frame(mesh.vertices, size=size, view=view, orthographic=orthographic)
+    camera = camera or frame(portrait(rig, mesh.vertices), size=size, view=view, orthographic=orthographic)
     corners = camera.project(mesh.vertices)[mesh.faces]
     area, (x, y, _) = -twice_area(corners) / 2, np.moveaxis(corners, -1, 0)     # y runs down: the seen side is negative
     area = np.sort(area[(area > 0) & (x.max(axis=1) > 0) & (x.min(axis=1) < camera.width)

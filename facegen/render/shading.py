@@ -12,6 +12,8 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
+from facegen.fileio.srgb import to_linear
+from facegen.fileio.srgb import to_srgb as encoded
 from facegen.geometry.camera import Camera
 from facegen.geometry.mesh import Mesh
 from facegen.geometry.normals import face_normals, vertex_normals
@@ -41,7 +43,7 @@ class Surface:
     normals: (n or m, 3) float32 in camera axes, a vertex's or (flat) a triangle's. light: (n, 1 + lights)
     float32, the ambient openness and each light's share. planes: (m, 3, 3) float32 weights of the corners
     as functions of pixel offsets from ``origin`` (m, 2). back: (m,) seen from inside. material: (m,) row of
-    the tables.
+    the tables. colours: (n, 3) float32 linear albedo of the vertices, or None.
     """
 
     faces: NDArray[np.int32]
@@ -55,6 +57,7 @@ class Surface:
     albedo: NDArray[np.float32]
     wrap: NDArray[np.float32]
     gloss: NDArray[np.float32]
+    colours: NDArray[np.float32] | None = None
 
 
 def surface(mesh: Mesh, camera: Camera, scene: Scene, *, flat: bool = False, light: NDArray[np.float32] | None = None,
@@ -74,7 +77,7 @@ def surface(mesh: Mesh, camera: Camera, scene: Scene, *, flat: bool = False, lig
     material = np.where(back, len(mesh.materials), mesh.face_materials).astype(np.int32)
     rows = material_rows(mesh, scene)
     return Surface(mesh.faces, (normals @ camera.rotation.T).astype(np.float32), flat, light, planes, origin, back,
-                   material, rows[:, :3], rows[:, 3:6], rows[:, 6:])
+                   material, rows[:, :3], rows[:, 3:6], rows[:, 6:], vertex_albedo(mesh))
 
 
 def baked_light(mesh: Mesh, normals: NDArray, camera: Camera, scene: Scene) -> NDArray[np.float32]:
@@ -90,6 +93,11 @@ def material_rows(mesh: Mesh, scene: Scene) -> NDArray[np.float32]:
     looks: list[Material] = [scene.materials.get(name, CLAY) for name in mesh.materials] + [INSIDE]
     return np.array([(*from_srgb(look.albedo), *look.wrap, look.specular, look.shininess, look.catch, look.lift)
                      for look in looks], np.float32)
+
+
+def vertex_albedo(mesh: Mesh) -> NDArray[np.float32] | None:
+    """Return the linear albedo (n, 3) of a mesh's vertices, or None if it leaves that to the materials."""
+    return None if mesh.colours is None else to_linear(mesh.colours).astype(np.float32)
 
 
 def light_directions(scene: Scene) -> NDArray[np.float64]:
@@ -115,6 +123,8 @@ def shade(surface: Surface, camera: Camera, scene: Scene, ids: NDArray, x: NDArr
     lifted = np.flatnonzero(lift)
     light[:, lifted] **= 1 - lift[lifted]
     inside = s.back[ids]
+    if s.colours is not None:
+        albedo = np.where(inside, albedo, sum(b[k, :, None] * s.colours[corners[:, k]] for k in range(3)).T)
 
     # Ambient: sky above, ground below; light that bounces in a cavity returns coloured: E = a / (1 - c (1 -
     # a)).
@@ -162,7 +172,7 @@ def to_srgb(linear: NDArray) -> NDArray[np.uint8]:
 
 def from_srgb(colour: tuple[float, float, float]) -> NDArray[np.float32]:
     """Return the linear value of an sRGB colour 0..255, (3,)."""
-    return np.array([_linear(c) for c in colour], np.float32)
+    return to_linear(colour).astype(np.float32)
 
 
 def _barycentrics(s: Surface, ids: NDArray, x: NDArray, y: NDArray) -> NDArray[np.float32]:
@@ -207,15 +217,7 @@ def _tone(linear: NDArray[np.float32]) -> NDArray[np.float32]:
     return np.minimum(linear, np.float32(SHOULDER)) + above * room / (above + room)
 
 
-def _linear(value: float) -> float:
-    """Return linear light 0..1 of an sRGB value 0..255 (IEC 61966-2-1)."""
-    v = value / 255
-    return v / 12.92 if v <= 0.04045 else ((v + 0.055) / 1.055) ** 2.4
-
-
 @cache
 def srgb_table() -> NDArray[np.uint8]:
     """Return the sRGB bytes of 4096 linear values 0..1."""
-    linear = np.arange(4096) / 4095
-    encoded = np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
-    return np.rint(encoded * 255).astype(np.uint8)
+    return np.rint(encoded(np.arange(4096) / 4095)).astype(np.uint8)

@@ -18,6 +18,7 @@ from facegen.face.deformer import Jaw
 from facegen.geometry.closest import Feet
 from facegen.geometry.factor import Factor
 from facegen.geometry.operators import Surface, dirichlet, hinge_energy
+from facegen.transfer.template import placing
 
 # Because a jaw that turns less than this share of the template's hardly opens, and one that turns more dislocates.
 _LEAST_TURN, _MOST_TURN = 0.45, 1.4
@@ -104,20 +105,12 @@ def jaw_share(surface: Surface, feet: Feet, template_faces: NDArray, template_sh
     carried[found] = (feet.weights[found] * template_share[template_faces[feet.faces[found]]]).sum(axis=1)
     area = np.maximum(surface.vertex_areas, 1e-9)
     trust = np.where(found, area / (feet.distances**2 + _NEAR**2), 0.0)
-    # One row of the mouth's interior lies between the lips: it takes neither side's share for certain.
-    held = sparse.csc_array((n, n))
-    right = trust * carried
     hold = _LIP_HOLD * area.mean()
-    for name, value in (("mouth_top", 0.0), ("mouth_bottom", 1.0)):
-        if name in places:
-            vertices, weights = places[name]
-            row = sparse.csr_array((weights, (np.zeros(3, int), vertices)), shape=(1, n))
-            worth = float((weights * trust[vertices]).sum())
-            if worth > hold:            # it has a partner: the template knows its share
-                continue
-            held = held + hold * (row.T @ row)
-            right[vertices] += hold * weights * value
-    matrix = (_SMOOTH * hinge_energy(surface) + 0.05 * dirichlet(surface) + held
+    lips = {name: value for name, value in (("mouth_top", 0.0), ("mouth_bottom", 1.0)) if name in places}
+    at = placing(places, list(lips), n)
+    firm = np.where(at @ trust > hold, 0.0, hold)           # where there is a partner the template knows the share
+    right = trust * carried + at.T @ (firm * np.array(list(lips.values())))
+    matrix = (_SMOOTH * hinge_energy(surface) + 0.05 * dirichlet(surface) + at.T @ (firm[:, None] * at)
               + sparse.diags_array(trust + 1e-6 * area))
     smooth = Factor(matrix, what="the jaw's share of the skin").solve(right)
     same = np.where(found, 1 / (1 + (np.where(found, feet.distances, 0.0) / _SAME) ** 2), 0.0)

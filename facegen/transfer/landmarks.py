@@ -15,12 +15,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from facegen.errors import InputError, TableError
-from facegen.face.landmarks import Landmark, landmark_entries, read_landmark
+from facegen.face.landmarks import REQUIRED, Landmark, landmark_entries, read_landmark
 from facegen.facs.validate import Entry
 from facegen.geometry.closest import ClosestPoints
 from facegen.geometry.mesh import Mesh
 from facegen.geometry.operators import Surface
-from facegen.transfer.landmark_checks import check_faces, place_faults
+from facegen.transfer.landmark_checks import place_faults
+from facegen.transfer.landmark_surface import check_faces
 from facegen.transfer.piece_names import INSIDE, kind_of_name
 
 # A point farther from the surface than this share of the landmarks' extent was set on another mesh, or slipped.
@@ -59,6 +60,11 @@ def snap(points: Mapping[str, NDArray], mesh: Mesh) -> Landmarks:
 
     Raises InputError naming those that are farther from any surface than a twentieth of the points' extent.
     """
+    wrong = [name for name, at in points.items()
+             if np.shape(at) != (3,) or not np.isfinite(np.asarray(at, float)).all()]
+    if wrong or not points:
+        raise InputError(f"points: expected three finite numbers for each landmark, got others for {_listed(wrong)}"
+                         if wrong else "points: expected at least one landmark")
     return _snap({name: Landmark(at=tuple(np.asarray(at, float))) for name, at in points.items()}, mesh)
 
 
@@ -83,7 +89,11 @@ def load_landmarks(path: Path | str, mesh: Mesh, *, mesh_name: str = "", digest:
 
 
 def check_places(landmarks: Landmarks, mesh: Mesh) -> list[str]:
-    """Return warnings, a sentence each, about landmarks that may be wrong; InputError for those that must be."""
+    """Return warnings, a sentence each, about landmarks that may be wrong; InputError for those that must be,
+    and for required ones that are missing."""
+    missing = [f"'{name}'" for name in REQUIRED if name not in landmarks.names]
+    if missing:
+        raise InputError(f"landmarks: {_listed(missing)} missing")
     check_faces(landmarks.names, landmarks.corners, landmarks.barycentric, mesh)
     errors, warnings = place_faults(landmarks.names, landmarks.corners, landmarks.barycentric, mesh)
     if errors:

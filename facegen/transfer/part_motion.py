@@ -118,5 +118,10 @@ def spread(motion: PartMotion, landmarks: Mapping[str, NDArray], at: NDArray) ->
         total += share
         matrix += share[:, None, None] * motion.matrices[part]
         turn += share[:, None, None] * motion.turns[part]
-    u, _, vt = np.linalg.svd(turn / total[:, None, None])
-    return matrix / total[:, None, None], u @ vt
+    return matrix / total[:, None, None], nearest_rotations(turn / total[:, None, None])
+
+
+def nearest_rotations(matrices: NDArray) -> NDArray[np.float64]:
+    """Return the rotations (n, 3, 3) nearest to means of rotations that differ by less than a right angle."""
+    u, _, vt = np.linalg.svd(matrices)
+    return u @ vt

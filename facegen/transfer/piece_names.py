@@ -17,23 +17,23 @@ _MEANINGS: tuple[tuple[str, frozenset[str]], ...] = (
     ("skin", frozenset({"eyelid", "eyelids", "lid", "lids", "lip", "lips"})),
     ("carried", frozenset({"lash", "lashes", "eyelash", "eyelashes", "cilia", "brow", "brows", "eyebrow", "eyebrows",
                            "moustache", "mustache", "beard", "goatee", "whisker", "whiskers", "tear", "tears",
-                           "tearline", "occlusion", "eyeline", "eyeliner", "stubble", "facial"})),
+                           "tearline", "occlusion", "eyeline", "eyeliner", "stubble"})),
     ("skull", frozenset({"glasses", "spectacles", "goggles", "eyewear", "hat", "cap", "helmet", "hood", "hair",
                          "hairs", "fringe", "bangs", "ponytail", "scalp", "ear", "ears", "horn", "horns", "antenna",
-                         "crown", "headband", "earring", "earrings", "mane", "forelock", "headphones", "mask"})),
-    ("teeth", frozenset({"tooth", "teeth", "gum", "gums", "denture", "dentures", "fang", "fangs", "molar", "incisor",
-                         "canine"})),
+                         "headband", "earring", "earrings", "mane", "forelock", "headphones"})),
+    ("teeth", frozenset({"tooth", "teeth", "gum", "gums", "denture", "dentures", "fang", "fangs", "molar", "molars",
+                         "incisor", "incisors"})),
     ("tongue", frozenset({"tongue"})),
     ("eye", frozenset({"eye", "eyes", "eyeball", "eyeballs", "cornea", "sclera", "iris", "irises", "pupil", "pupils",
                        "eyewhite", "limbus", "highlight", "highlights", "catchlight"})),
     ("body", frozenset({"body", "torso", "cloth", "clothes", "clothing", "shirt", "suit", "dress", "jacket", "coat",
                         "collar", "tie", "scarf", "hand", "hands", "arm", "arms", "leg", "legs", "foot", "feet",
-                        "shoe", "shoes", "tops", "bottoms", "onepiece", "tail", "wing", "wings"})),
+                        "shoe", "shoes", "tops", "bottoms", "onepiece", "tail"})),
     ("mouth", frozenset({"mouth", "oral", "palate", "cavity", "throat"})),
     ("skin", frozenset({"skin", "face", "head"})),
 )
-_UPPER = frozenset({"upper", "up", "top", "maxilla", "maxillary", "u"})
-_LOWER = frozenset({"lower", "low", "down", "bottom", "mandible", "mandibular", "jaw", "d"})
+_UPPER = frozenset({"upper", "up", "top", "maxilla", "maxillary"})
+_LOWER = frozenset({"lower", "low", "down", "bottom", "mandible", "mandibular", "jaw"})
 
 
 def words_of(name: str) -> frozenset[str]:

@@ -47,7 +47,7 @@ STEPS = (Step(40.0, 0.02, 0.0, 0.0), Step(40.0, 0.01, 0.002, 40.0, 2), Step(20.0
 _HOLD = 1e2
 # Because normals of the registered skin are those of a rough draft at first: this is wider than the final match.
 _LEAST_COSINE = 0.1
-# Because a place beyond the template's border has its nearest place on the border: this far in mm, and it has no partner.
+# Because a place beyond the template's border has its nearest place on the border: this far in mm, it has no partner.
 _PAST = 1.0
 
 

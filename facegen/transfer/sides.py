@@ -15,6 +15,7 @@ from scipy import sparse
 
 from facegen.geometry.factor import Factor
 from facegen.geometry.operators import Surface, dirichlet
+from facegen.transfer.template import placing
 
 SLITS = (
     (("mouth_top", "mouth_upper_L", "mouth_upper_R"), ("mouth_bottom", "mouth_lower_L", "mouth_lower_R"),
@@ -23,8 +24,8 @@ SLITS = (
        tuple(f"{name}_{side}" for name in ("eye_lower", "eye_lower_inner", "eye_lower_outer")),
        (f"eye_inner_{side}", f"eye_outer_{side}")) for side in "LR"),
 )
-"""For each slit the landmarks above, below and at its corners. The inner edges of the lips are not among them: where lips
-touch, a person who sets points cannot see on which lip a point lands (see `settled`)."""
+"""For each slit the landmarks above, below and at its corners. The inner edges of the lips are not among them: where
+lips touch, a person who sets points cannot see on which lip a point lands (see `settled`)."""
 
 _INNER = {"mouth_inner_top": 1.0, "mouth_inner_bottom": -1.0}
 # Because a point on the wrong lip belongs to a vertex about as near on the other: not farther than this, in mm.
@@ -45,17 +46,15 @@ def side_fields(surface: Surface, places: Mapping[str, tuple[NDArray, NDArray]])
     """
     n = len(surface.vertices)
     matrix = dirichlet(surface) + sparse.diags_array(np.maximum(surface.vertex_areas, 1e-9) / _REACH**2)
-    held, sides = sparse.csc_array((n, n)), np.zeros((n, len(SLITS)))
-    for slit, (above, below, corners) in enumerate(SLITS):
-        for names, value in ((above, 1.0), (below, -1.0), (corners, 0.0)):
-            for name in names:
-                if name in places:
-                    vertices, weights = places[name]
-                    row = sparse.csr_array((weights, (np.zeros(3, int), vertices)), shape=(1, n))
-                    held = held + _HOLD * (row.T @ row)
-                    sides[vertices, slit] += _HOLD * weights * value
+    rows = [(name, slit, value) for slit, slits in enumerate(SLITS)
+            for names, value in zip(slits, (1.0, -1.0, 0.0), strict=True) for name in names if name in places]
+    at = placing(places, [name for name, _, _ in rows], n)
+    wanted = np.zeros((len(rows), len(SLITS)))
+    for row, (_, slit, value) in enumerate(rows):
+        wanted[row, slit] = value
     # A hold of one slit also holds the others' fields at zero there: they are far from each other.
-    return Factor(matrix + held, what="which side of a slit the skin lies on").solve(sides)
+    held = Factor(matrix + _HOLD * (at.T @ at), what="which side of a slit the skin lies on")
+    return held.solve(_HOLD * (at.T @ wanted))
 
 
 def settled(surface: Surface, places: Mapping[str, tuple[NDArray, NDArray]], sides: NDArray

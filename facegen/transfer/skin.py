@@ -91,7 +91,8 @@ class Skin:
             moved = (matrix @ template.motion.reshape(k, -1).T).T.reshape(k, -1, 3)
             return gradient_transfer(self.surface, self.registered, template.surface, template.motion, weights=chosen,
                                      landmarks=places, landmark_motion=moved, root=method == "sumner")
-        result = self._solver(weights or OURS).solve(self._without_jaw())[:, :len(self.surface.vertices)]
+        rest = self._without_jaw()
+        result = self._solver(weights or OURS, rest).solve(rest)[:, :len(self.surface.vertices)]
         if self.jaw is not None:
             for some in _blocks(len(result)):
                 turned = self.jaw.movement(self.surface.vertices, template.jaw[some])
@@ -115,10 +116,10 @@ class Skin:
         return (placing(self.places, names, len(self.surface.vertices)),
                 landmark_matrix(self.template.places, names, matrices, len(self.template.surface.vertices)))
 
-    def _solver(self, weights: Weights) -> Transfer:
-        """Return the factored system, on a finer copy of the skin where the template bends more than it can."""
+    def _solver(self, weights: Weights, motion: NDArray) -> Transfer:
+        """Return the factored system, on a finer copy of the skin where a motion (k, n_s, 3) of the template bends more
+        than it can."""
         template, surface, registered = self.template, self.surface, self.registered
-        motion = self._without_jaw()
         sides, feet = self.sides, self.feet
         places, matrix = self._landmark_motion()
         if len(surface.faces) < _FINE_ENOUGH:
@@ -146,7 +147,7 @@ class Skin:
         most = abs(difference) @ reach
         mobile = np.flatnonzero(most > BEND)
         most[mobile] = 0.0
-        for some in _blocks(len(motion)):
+        for some in _blocks(len(motion) if len(mobile) else 0):
             moved = difference[mobile] @ np.moveaxis(motion[some], 0, 1).reshape(n, -1)
             length = np.sqrt((moved.reshape(len(mobile), -1, 3) ** 2).sum(axis=2))
             most[mobile] = np.maximum(most[mobile], length.max(axis=1))

@@ -29,13 +29,14 @@ from scipy import sparse
 from facegen.geometry.closest import Feet
 from facegen.geometry.factor import Factor
 from facegen.geometry.operators import Surface, dirichlet, hinge_energy
+from facegen.transfer.part_motion import nearest_rotations
 
 # Gradients without a partner are zero with this share of the others' weight: they give way, but do not wrinkle.
 _ALONE = 0.05
 # Because each piece that no partner holds would float: everything is tied to its place this much, times the diagonal.
 _TIE = 1e-7
-# A vertex without a partner, in a mouth's lining or on a body, stays where it is with this share of the anchor's weight:
-# the lips' motion is gone two centimetres into the mouth and does not push its walls through the cheeks.
+# A vertex without a partner, in a mouth's lining or on a body, stays where it is with this share of the anchor's
+# weight: the lips' motion is gone two centimetres into the mouth and does not push its walls through the cheeks.
 _STAY = 0.3
 # Millimetres over which the trust in a partner fades.
 _FADE = 6.0
@@ -91,9 +92,7 @@ class Transfer:
         n, n_s = len(surface.vertices), len(template.vertices)
         t = np.flatnonzero(feet.found)
         s = feet.faces[t]
-        turn = turns[surface.faces[t]].mean(axis=1)
-        u, _, vt = np.linalg.svd(turn)
-        turn = u @ vt
+        turn = nearest_rotations(turns[surface.faces[t]].mean(axis=1))
         plane = rotation_between(np.einsum("tij,tj->ti", turn, template.normals[s]), surface.normals[t]) @ turn
         # d(hat_i)/d(place) . Q . d(hat_j)/d(place): how corner i of t answers corner j of s
         answer = np.einsum("tia,tab,tjb->tij", surface.hat_gradients[t], plane, template.hat_gradients[s])

@@ -13,11 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from facegen.blendshapes.recipes import Recipe
 from facegen.face.deformer import Jaw
-from facegen.face.face import Controls, Face
-from facegen.facs.deformation import Deformation
+from facegen.face.face import Face
+from facegen.face.motion import joined
 from facegen.geometry.closest import ClosestPoints
-from facegen.geometry.mesh import Mesh
 from facegen.geometry.operators import Surface
 
 DETAIL = 2
@@ -32,8 +32,8 @@ class Template:
 
     ``landmarks``: name -> place (3,); ``places``: name -> vertices (3,) of the skin and their weights (3,). ``motion``
     (k, n, 3) mm. ``jaw`` (k, 3): opening in degrees, side and forward in mm; ``gaze`` (k, 4): yaw and pitch in degrees,
-    left eye then right. ``hinge``: how the jaw moves; ``jaw_share`` (n,): how much of it each vertex takes. ``rest``:
-    all parts' neutral, or None, and ``rest_motion`` (k, r, 3) of its vertices.
+    left eye then right. ``hinge``: how the jaw moves; ``jaw_share`` (n,): how much of it each vertex takes. ``minus``
+    (k,): the shape to take away from the result, or -1.
     """
 
     name: str
@@ -46,8 +46,7 @@ class Template:
     gaze: NDArray[np.float64]
     hinge: Jaw | None
     jaw_share: NDArray[np.float64]
-    rest: Mesh | None = None
-    rest_motion: NDArray[np.float64] | None = None
+    minus: tuple[int, ...]
 
     @property
     def height(self) -> float:
@@ -70,25 +69,29 @@ def placing(places: Mapping[str, tuple[NDArray, NDArray]], names: Sequence[str],
     return sparse.csr_array((values, (rows, columns)), shape=(len(names), n))
 
 
-def template_of(face: Face, shapes: Mapping[str, Deformation], *, detail: int = DETAIL) -> Template:
-    """Return the parametric face as a template of the named deformations."""
+def template_of(face: Face, shapes: Mapping[str, Recipe], *, detail: int = DETAIL) -> Template:
+    """Return the parametric face as a template of the named shapes.
+
+    A shape that is a difference (mouthClose, which corrects jawOpen) is transferred as the pose that it leads to; the
+    other is taken away on the avatar. That other must be among the shapes.
+    """
     mesh = face.mesh(detail)
     skin = mesh.part_vertices(mesh.parts[0])
     n = int(skin[-1]) + 1                                   # the skin comes first, all of its vertices are used
     surface = Surface(mesh.vertices[:n], mesh.faces[mesh.face_parts == 0])
     places = _skin_places(face, surface, detail)
-    each = [face.controls(deformation) for deformation in shapes.values()]
-    together = Controls(*(np.stack([getattr(c, field) for c in each])
-                          for field in ("vectors", "jaw", "lids", "eyes", "head", "folds")))
-    motion = face.pose_controls(together, detail=detail) - mesh.vertices
+    together = joined(face, [shape.deformation for shape in shapes.values()])
+    motion = face.pose_controls(together, detail=detail)[:, :n] - surface.vertices
     hinge = face.deformer.jaw
     opened = np.array([_TEST_OPENING, 0.0, 0.0])
     test = face.pose({"units": "millimetre", "jaw": {"open": _TEST_OPENING}}, detail=detail)[:n] - surface.vertices
     turned = hinge.movement(surface.vertices, opened)
     share = np.clip((test * turned).sum(axis=1) / np.maximum((turned**2).sum(axis=1), 1e-12), 0.0, 1.0)
-    return Template(face.name, surface, {name: weights @ surface.vertices[rows] for name, (rows, weights) in places.items()},
-                    places, tuple(shapes), motion[:, :n], together.jaw, together.eyes, hinge, share,
-                    mesh, motion)
+    landmarks = {name: weights @ surface.vertices[rows] for name, (rows, weights) in places.items()}
+    order = {name: row for row, name in enumerate(shapes)}
+    minus = tuple(-1 if shape.minus is None else order[shape.minus] for shape in shapes.values())
+    return Template(face.name, surface, landmarks, places, tuple(shapes), motion, together.jaw, together.eyes,
+                    hinge, share, minus)
 
 
 def _skin_places(face: Face, surface: Surface, detail: int) -> dict[str, tuple[NDArray, NDArray]]:

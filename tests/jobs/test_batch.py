@@ -181,12 +181,12 @@ def test_stale_pictures_are_drawn_again(copied, jobs, monkeypatch):
     before = times(copied)
     digests.table_digests.cache_clear()
     monkeypatch.setattr(digests, "file_digest", lambda path: "other" if path.name == "lights.yaml" else "same")
-    digests.face_digest.cache_clear()
+    digests.kept_digest.cache_clear()
     try:
         assert run_batch(jobs, copied, workers=1).made == 12
     finally:
         digests.table_digests.cache_clear()
-        digests.face_digest.cache_clear()
+        digests.kept_digest.cache_clear()
     after = times(copied)
     assert all(after[name] > before[name] for name in before)
     monkeypatch.undo()

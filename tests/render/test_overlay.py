@@ -164,7 +164,7 @@ def test_a_faces_cage_over_its_smooth_skin():
     (Wireframe(opacity=1.5), r"^wireframe\.opacity: expected a number 0\.\.1, got 1\.5"),
     (Wireframe(opacity="a"), r"^wireframe\.opacity: "),
     (Wireframe(lines="cag"), r"^wireframe\.lines: expected mesh, cage, got 'cag'; did you mean 'cage'"),
-    (Wireframe(lines="cage"), r"^wireframe\.lines: 'cage' needs a face, .*got a Mesh"),
+    (Wireframe(lines="cage"), r"^wireframe\.lines: 'cage' needs a face that has one, .*for a Mesh"),
     (Wireframe(parts=["skim"]), r"^wireframe\.parts: .*did you mean 'skin'"),
     (Wireframe(parts="skin"), r"^wireframe\.parts: expected a list"),
 ])

@@ -1,0 +1,1 @@
+"""Named shapes: the vocabularies of faces (units, ARKit, visemes, VRM), what each shape is made of, their names."""

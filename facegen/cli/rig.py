@@ -1,0 +1,58 @@
+"""``facegen rig``: blendshapes for an avatar."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from facegen.cli.options import Json, PersonName, Quiet, print_json, warn
+from facegen.errors import InputError
+
+Avatar = Annotated[str, typer.Argument(
+    metavar="AVATAR", help="The path of a .obj, .glb, .gltf, .vrm, .ply or .stl file, or a shipped avatar's name.")]
+Out = Annotated[Path | None, typer.Option(
+    "--output", "-o", metavar="OUT", help="Where it goes: .glb, .gltf, .vrm, .npz or an OBJ folder. [required]")]
+Marks = Annotated[Path | None, typer.Option(
+    "--landmarks", "-l", metavar="FILE", help="The avatar's landmarks; a shipped avatar has its own.")]
+Sets = Annotated[str, typer.Option(
+    "--set", metavar="SETS", help="Which shapes, by commas: units, expressions, arkit, visemes, vrm or all.")]
+Method = Annotated[str, typer.Option("--method", metavar="NAME", help="landmarks, or to compare: sumner, cloning.")]
+Opening = Annotated[float, typer.Option("--opening", metavar="FACTOR", help="How far the jaw opens, of the estimate.")]
+Pieces = Annotated[list[str] | None, typer.Option(
+    "--piece", metavar="PART=KIND", help="What a part is (skin, eye_L, teeth_upper, skull, carried ...); repeatable.")]
+NoNormals = Annotated[bool, typer.Option("--no-normals", help="Leave out how normals change: half the size.")]
+Quantise = Annotated[bool, typer.Option("--quantise", help="Two bytes a number instead of four.")]
+
+
+def rig(avatar: Avatar, output: Out = None, landmarks: Marks = None, sets: Sets = "units,arkit,visemes",
+        person: PersonName = None, method: Method = "landmarks", opening: Opening = 1.0, piece: Pieces = None,
+        no_normals: NoNormals = False, quantise: Quantise = False, json: Json = False, quiet: Quiet = False) -> None:
+    """Give an avatar the expressions as blendshapes.
+
+    For example: facegen rig cat.obj --landmarks cat.yaml -o cat.glb
+    Then: facegen render happiness --face cat.glb -o cat.png
+    """
+    if output is None:
+        raise InputError("-o: say where the avatar goes, for example -o avatar.glb")
+    given = {}
+    for entry in piece or []:
+        part, equals, kind = entry.partition("=")
+        if not (part and equals and kind):
+            raise InputError(f"--piece: expected PART=KIND such as hat=skull, got {entry!r}")
+        given[part] = kind
+    from facegen.transfer.rig import rig as make
+
+    names = [name.strip() for name in sets.split(",") if name.strip()]
+    made = make(avatar, output, landmarks=landmarks, sets=names, person=person, method=method, opening=opening,
+                pieces=given, normals=not no_normals, quantise=quantise)
+    if not quiet:
+        warn(made.warnings)
+    if json:
+        print_json({"file": str(made.path), "shapes": list(made.names), "warnings": list(made.warnings),
+                    "pieces": made.pieces})
+    elif not quiet:
+        for row in made.pieces:
+            print(f"{row['name']}: {row['kind']}, {row['triangles']} triangles ({row['why']})")
+        print(f"{made.path}: {len(made.names)} shapes")

@@ -1,0 +1,306 @@
+"""An avatar with blendshapes is a face like any other: expressions, action units and raw data become its weights.
+
+    v = v0 + sum_i w_i s_i
+
+A rig of facegen's own units is posed exactly by the coefficients that the unit table gives. Another rig - ARKit's
+shapes, expressions, VRM's presets, visemes - is posed by the weights that come nearest (`facegen.face.convert`).
+"""
+
+from __future__ import annotations
+
+import numbers
+from collections.abc import Mapping
+from dataclasses import replace
+from functools import cache, cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from facegen.blendshapes.names import match, shape_of
+from facegen.blendshapes.recipes import CLASH, Recipe, is_head, shape_set
+from facegen.errors import InputError, nearest
+from facegen.face.avatar_landmarks import placing
+from facegen.face.avatar_notes import Notes, read_notes
+from facegen.face.convert import Shapes, raw_movement
+from facegen.face.face import load_face
+from facegen.face.head import neck_weight, turn_head
+from facegen.facs.deformation import Deformation, weighted_sum
+from facegen.facs.expressions import Resolution, resolve
+from facegen.facs.tables import load_units
+from facegen.geometry.mesh import Mesh
+
+if TYPE_CHECKING:
+    from facegen.fileio.avatar import AvatarFile
+
+Array = NDArray[np.float64]
+
+LOST = 0.2
+"""A pose that loses more than this share of its movement is warned of."""
+
+# With so many of ARKit's 52 a rig says all of a face; its visemes and presets then only repeat it.
+_MOST_OF_ARKIT = 40
+# The neck of the base face: where it is if the notes do not say, and from the pivot, above which place all turns and
+# below which nothing does; millimetres of a head of the base face's size, which notes' millimetres are.
+_PIVOT = np.array([0.0, -70.0, -75.0])
+_MOVES_ABOVE, _RESTS_BELOW = np.array([0.0, -14.0, 5.0]), np.array([0.0, -68.0, -5.0])
+# The head, millimetres round the eyes' middle: what a picture of an avatar with a body shows. Landmarks outside widen
+# it, with so much room round them.
+_HEAD_LOW, _HEAD_HIGH, _ROOM = np.array([-100.0, -150.0, -160.0]), np.array([100.0, 150.0, 60.0]), 30.0
+# Because units that close an eye by more than half are those to give way when others close it too.
+_CLOSERS = 0.5
+_TOUCH = 1e-9           # rounding of a sum that is one
+_MOUTH_WIDTH = 44.8     # mm, of the base face: what lengths of raw data are fractions of, where no landmarks tell
+_WIDEST = "27"          # the unit that opens the jaw as far as it goes
+_KEPT = 256             # poses whose weights are remembered
+
+
+class AvatarFace:
+    """A face made of an avatar's file and its blendshapes; load one with `load_face`.
+
+    ``name``; ``shapes``: names of all blendshapes in the file; ``digest`` of the file. ``colours``: material -> sRGB
+    0..255 as far as known. ``focus``: the vertices a picture should frame, or None for all.
+    """
+
+    def __init__(self, avatar: AvatarFile) -> None:
+        if not avatar.shapes:
+            raise InputError(f"face: {avatar.path} has no blendshapes (morph targets) yet; rig it first: "
+                             f"facegen rig {avatar.path.name} --landmarks {avatar.path.stem}.yaml "
+                             f"-o {avatar.path.stem}-rigged.glb")
+        self.name = avatar.path.stem
+        self.path = avatar.path
+        self.digest = avatar.digest
+        self.colours: Mapping[str, tuple[float, float, float]] = dict(avatar.colours)
+        self.notes: Notes = read_notes(avatar.notes, str(avatar.path), backward=_is_vrm0(avatar))
+        self._file = avatar
+        self._mesh = replace(avatar.mesh, vertices=self.notes.apply(avatar.mesh.vertices),
+                             colours=avatar.vertex_colours)
+        self._moves: dict[str, tuple[NDArray[np.int64], Array]] = {}
+        self._fitted: dict[Any, tuple[dict[str, float], float]] = {}
+
+    # -- what there is ------------------------------------------------------------------------------------------
+    @property
+    def shapes(self) -> tuple[str, ...]:
+        """Names of all blendshapes in the file."""
+        return tuple(self._file.shapes)
+
+    @property
+    def landmarks(self) -> tuple[str, ...]:
+        """Names of the landmarks that the file's notes give."""
+        return tuple(self.notes.landmarks)
+
+    def mesh(self, detail: int = 2) -> Mesh:
+        """Return the neutral, millimetres; an avatar has one level of detail, so ``detail`` changes nothing."""
+        return self._mesh
+
+    def landmark_points(self, vertices: Array, *, detail: int = 2) -> dict[str, Array]:
+        """Return name -> place (3,), mm, of every landmark on posed vertices (n, 3)."""
+        vertices = np.asarray(vertices, np.float64)
+        if vertices.shape != self._mesh.vertices.shape:
+            raise InputError(f"vertices: expected shape {self._mesh.vertices.shape}, got {vertices.shape}")
+        return dict(zip(self.landmarks, self._landmark_weights @ vertices, strict=True))
+
+    @cached_property
+    def known(self) -> dict[str, tuple[str, Recipe]]:
+        """Blendshape -> (the shape that it is, its recipe), for those whose names are understood."""
+        recipes = shape_set("all")
+        found = match(self.shapes, {shape: recipe.also for shape, recipe in recipes.items()})
+        for shape, kind in self.notes.sets.items():
+            plain = CLASH + shape
+            if kind == "expressions" and found.get(shape) == shape and plain in recipes:
+                found[shape] = plain                    # a file of expressions alone: blink is the expression
+        return {name: (shape, recipes[shape]) for name, shape in found.items()}
+
+    @cached_property
+    def focus(self) -> NDArray[np.int64] | None:
+        """The vertices of the head, if the notes tell it from a body; None is all."""
+        if not self.notes.landmarks:
+            return None
+        places = np.array(list(self.notes.landmarks.values()))
+        eyes = [at for name, at in self.notes.landmarks.items() if name.startswith(("eye_inner", "eye_outer"))]
+        middle = np.mean(eyes or places, axis=0)
+        low = np.minimum(middle + _HEAD_LOW, places.min(axis=0) - _ROOM)
+        high = np.maximum(middle + _HEAD_HIGH, places.max(axis=0) + _ROOM)
+        used = np.unique(self._mesh.faces)
+        at = self._mesh.vertices[used]
+        inside = used[((at >= low) & (at <= high)).all(axis=1)]
+        # A little neck or hair belongs to the portrait; a body does not.
+        whole, head = np.ptp(at, axis=0).max(), (high - low).max()
+        return inside if len(inside) and whole > 1.5 * head else None
+
+    # -- poses --------------------------------------------------------------------------------------------------
+    def pose(self, what: Any = "neutral", *, person: Any = None, intensity: float = 1.0, detail: int = 2) -> Array:
+        """Return the vertices (n, 3), mm, under an expression: anything that the parametric face takes."""
+        found = self.resolve(what, person=person, intensity=intensity)
+        vertices = self.pose_shapes(self.shape_weights(found))
+        head = _head_of(found)
+        if not head or not self.notes.framed:
+            return vertices
+        forward = head.get("forward", 0.0) * (self._mouth_width if found.deformation.units == "face" else 1.0)
+        turn = np.array([*(head.get(key, 0.0) for key in ("yaw", "pitch", "roll")), forward])
+        return turn_head(vertices, turn, self._pivot, self._neck_weight)
+
+    def pose_shapes(self, weights: Mapping[str, float]) -> Array:
+        """Return the vertices (n, 3), mm, for blendshape -> weight, by the file's own names. Weights may leave 0..1.
+
+        No weight moves nothing: the neutral comes back bit for bit. InputError for a name that the file has not.
+        """
+        vertices = self._mesh.vertices.copy()
+        for name in self.shapes:
+            weight = weights.get(name, 0.0)
+            if weight:
+                rows, moves = self._moved(name)
+                vertices[rows] += weight * moves
+        for name, weight in weights.items():
+            if name not in self._file.shapes:
+                raise InputError(f"weights: {self.path.name} has no shape '{name}'{nearest(name, self.shapes)}")
+            if isinstance(weight, bool) or not isinstance(weight, numbers.Real) or not np.isfinite(weight):
+                raise InputError(f"weights: {name}: expected a finite number, got {weight!r}")
+        return vertices
+
+    def resolve(self, what: Any, *, person: Any = None, intensity: float = 1.0) -> Resolution:
+        """Return the chain name -> units -> deformation data; what has been resolved is returned as it is."""
+        if isinstance(what, Resolution):
+            return what
+        return resolve(what, person=person, intensity=intensity)
+
+    def shape_weights(self, found: Resolution) -> dict[str, float]:
+        """Return blendshape -> weight that shows what was resolved, as well as these shapes can."""
+        return self._weights(found)[0]
+
+    def check(self, meaning: Resolution) -> tuple[str, ...]:
+        """Return what to warn of: movement that these shapes cannot make, a head that cannot turn."""
+        lost = self._weights(meaning)[1]
+        warnings = []
+        if lost > LOST:
+            warnings.append(f"{self.path.name} has no shapes for {100 * lost:.0f} % of this movement; the nearest is "
+                            "shown")
+        if _head_of(meaning) and not self.notes.framed:
+            warnings.append(f"{self.path.name} does not say where its neck is, so the head does not turn; "
+                            "`facegen rig` notes it")
+        return tuple(warnings)
+
+    # -- inside -------------------------------------------------------------------------------------------------
+    def _weights(self, found: Resolution) -> tuple[dict[str, float], float]:
+        table = load_units()
+        members = {name: value for name, value in table.coefficients(found.units).items() if not is_head(name)}
+        raw = tuple(one for one in (_beyond(found, table), *found.more) if one)
+        if not members and not raw:
+            return {}, 0.0
+        key = (tuple(members.items()), raw)
+        if key not in self._fitted:
+            if not self.known:
+                raise InputError(f"face: none of the {len(self.shapes)} blendshapes of {self.path.name} has a name "
+                                 "that is understood (units such as AU12_L, ARKit, visemes, VRM, expressions); "
+                                 "rename them, or rig the neutral: facegen rig")
+            fitted, lost = self._made_of.fitted(_held(members), raw_movement(raw) if raw else None)
+            if len(self._fitted) >= _KEPT:
+                self._fitted.clear()
+            self._fitted[key] = self._by_name(fitted), lost
+        return self._fitted[key]
+
+    @cached_property
+    def _made_of(self) -> Shapes:
+        """The shapes that poses are made of: units if there are all, else whatever says the most."""
+        recipes = dict(self.known.values())
+        units = {shape: recipe for shape, recipe in recipes.items() if recipe.set == "units"}
+        if set(units) >= _moving_units():
+            return Shapes(units)
+        if sum(recipe.set == "arkit" for recipe in recipes.values()) >= _MOST_OF_ARKIT:
+            recipes = {shape: one for shape, one in recipes.items() if one.set not in ("visemes", "vrm")}
+        # A corrective without the shape that it corrects means nothing.
+        return Shapes({shape: one for shape, one in recipes.items() if one.minus is None or one.minus in recipes})
+
+    def _moved(self, name: str) -> tuple[NDArray[np.int64], Array]:
+        """Return the vertices that a shape moves and how (k, 3), mm; kept."""
+        if name not in self._moves:
+            moves = np.asarray(self._file.shapes[name], np.float64)
+            rows = np.flatnonzero(moves.any(axis=1))
+            self._moves[name] = rows, self.notes.vectors(moves[rows])
+        return self._moves[name]
+
+    @cached_property
+    def _landmark_weights(self) -> sparse.csr_array:
+        return placing(self.notes, self._mesh, self._opened)
+
+    def _opened(self) -> Array | None:
+        """Return how the vertices move when the jaw opens, mm, or None if no shape does that."""
+        weights, left = self._made_of.read_off({_WIDEST: 1.0}) if self.known else ({}, {_WIDEST: 1.0})
+        if left:
+            return None
+        return self.pose_shapes(self._by_name(weights)) - self._mesh.vertices
+
+    def _by_name(self, weights: Mapping[str, float]) -> dict[str, float]:
+        """Return weights by the file's own names for weights by the shapes that they are."""
+        names = {shape: name for name, (shape, _) in self.known.items()}
+        return {names[shape]: weight for shape, weight in weights.items()}
+
+    @cached_property
+    def _mouth_width(self) -> float:
+        corners = [self.notes.landmarks.get(f"mouth_corner_{side}") for side in "LR"]
+        return _MOUTH_WIDTH if any(at is None for at in corners) else float(np.linalg.norm(corners[0] - corners[1]))
+
+    @property
+    def _pivot(self) -> Array:
+        return _PIVOT if self.notes.neck is None else self.notes.neck
+
+    @cached_property
+    def _neck_weight(self) -> Array:
+        weight = neck_weight(self._mesh.vertices, self._pivot + _MOVES_ABOVE, self._pivot + _RESTS_BELOW)
+        for part in set(self.notes.parts("body")) & set(self._mesh.parts):
+            weight[self._mesh.part_vertices(part)] = 0.0
+        return weight
+
+
+def _is_vrm0(avatar: AvatarFile) -> bool:
+    """Return whether a file is of VRM 0.x, whose avatars look to -z."""
+    found = getattr(getattr(avatar.source, "file", None), "json", {})
+    return isinstance(found.get("extensions"), Mapping) and "VRM" in found["extensions"]
+
+
+def _head_of(found: Resolution) -> Mapping[str, float]:
+    return found.deformation.head
+
+
+def _beyond(found: Resolution, table: Any) -> Deformation | None:
+    """Return the raw movement in a deformation beyond its units, without the head's; a clip may hold both."""
+    whole = found.deformation
+    rest = whole
+    if found.units:
+        made = weighted_sum([(value, table.basis[name]) for name, value in table.coefficients(found.units).items()])
+        rest = whole - made             # sums are exact to the last bit: what units alone make leaves nothing
+    if rest.head:
+        rest = Deformation(rest.points, rest.jaw, rest.lids, rest.eyes, {}, rest.folds, rest.units, rest.with_jaw)
+    return rest if rest else None
+
+
+@cache
+def _moving_units() -> frozenset[str]:
+    """Shapes of units that move something."""
+    return frozenset(shape_of(name) for name, one in load_units().basis.items() if one and not is_head(name))
+
+
+@cache
+def _closures() -> dict[str, tuple[float, float]]:
+    """Member of the unit table -> how much of the left and the right eye it closes, lids that follow the gaze too."""
+    face, found = load_face(), {}
+    for name, one in load_units().basis.items():
+        lids = face.controls(one, strict=False).lids
+        if lids.any():
+            found[name] = float(lids[:2].sum()), float(lids[2:].sum())
+    return found
+
+
+def _held(members: Mapping[str, float]) -> dict[str, float]:
+    """Return coefficients that close no eye twice: lids that meet stop, blendshapes would go on through each other."""
+    held = dict(members)
+    for side in (0, 1):
+        closing = {name: value * _closures()[name][side] for name, value in held.items() if name in _closures()}
+        beyond = sum(closing.values()) - 1.0
+        strong = {name: share for name, share in closing.items() if share and _closures()[name][side] >= _CLOSERS}
+        total = sum(strong.values())
+        if beyond > _TOUCH and total > 0.0:
+            for name in strong:
+                held[name] *= max(0.0, 1.0 - beyond / total)
+    return held

@@ -1,0 +1,114 @@
+"""The one door of the transfer: an avatar's mesh and landmarks in, its shapes out.
+
+Based on: Onizuka et al. (2018), section 4, on avatars of several pieces. The steps: into the template's frame (eq. 9,
+by landmarks instead of boxes, so that hair or a body does not count), apart into pieces, the skin by `skin`, the other
+pieces as what they are, and back.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from facegen.errors import InputError, nearest
+from facegen.geometry.closest import ClosestPoints
+from facegen.geometry.mesh import Mesh
+from facegen.geometry.operators import Surface
+from facegen.transfer.alignment import Similarity, align
+from facegen.transfer.baselines import PaperWeights
+from facegen.transfer.keep_apart import Contact, keep_apart
+from facegen.transfer.landmarks import Landmarks
+from facegen.transfer.piece_motion import PieceMotion, RigidMotions
+from facegen.transfer.pieces import Piece, face_names, find_pieces
+from facegen.transfer.skin import METHODS, Skin, lay_skin
+from facegen.transfer.solve import Weights
+from facegen.transfer.template import Template
+from facegen.transfer.weld import weld
+
+# The jaw of an avatar opens between these shares of what is estimated; more is a mistake.
+_LEAST_OPENING, _MOST_OPENING = 0.1, 3.0
+
+
+@dataclass(frozen=True, eq=False)
+class Transferred:
+    """``shapes``: name -> displacement (n, 3) of the avatar's own vertices, in its own axes and units. ``frame``: from
+    there to the template's. ``skin``, ``pieces``: what the avatar was taken for; ``contacts``: how far eyes and teeth
+    went through the skin before and after they were kept apart, mm."""
+
+    shapes: Mapping[str, NDArray]
+    frame: Similarity
+    skin: Skin
+    pieces: tuple[Piece, ...]
+    contacts: Mapping[str, Contact]
+
+
+def transfer(mesh: Mesh, landmarks: Landmarks, template: Template, *, method: str = "landmarks",
+             weights: Weights | PaperWeights | None = None, opening: float = 1.0,
+             pieces: Mapping[str, str] | None = None) -> Transferred:
+    """Return the template's shapes on an avatar.
+
+    mesh: the avatar, in any axes and units. landmarks: on it. method: "landmarks" (ours), or a published one to compare
+    with: "sumner", "cloning". weights: of the energies; `PAPER` holds the paper's. opening: a factor on how far the jaw
+    opens. pieces: part, material or number of a component -> kind. Raises InputError for what cannot be used: unknown
+    names, a mesh that cannot be solved.
+    """
+    if method not in METHODS:
+        raise InputError(f"method: expected {', '.join(METHODS)}, got {method!r}{nearest(str(method), METHODS)}")
+    if not _LEAST_OPENING <= opening <= _MOST_OPENING:
+        raise InputError(f"opening: expected a factor of {_LEAST_OPENING} to {_MOST_OPENING}, got {opening!r}")
+    frame = align(landmarks.points(mesh.vertices), template.landmarks)
+    turned = frame.apply(mesh.vertices)
+    places = landmarks.points(turned)
+    vertices, own = weld(turned, mesh.faces)
+    faces = own[mesh.faces]
+    found = find_pieces(vertices, faces, places, names=face_names(mesh), explicit=pieces)
+    rows, surface = _skin_surface(vertices, faces, found)
+    skin = lay_skin(template, surface, _skin_places(landmarks, own, rows, surface, places, template), opening=opening)
+    motion = np.zeros((len(template.names), len(vertices), 3))
+    motion[:, rows] = skin.motion(method, weights)
+    contacts: Mapping[str, Contact] = {}
+    if method == "landmarks":
+        moved = PieceMotion(found, vertices, faces, places)
+        jaw = None if skin.jaw is None else RigidMotions.of(lambda at: skin.jaw.movement(at, template.jaw))
+        motion = moved.move(motion, jaw, template.gaze)
+        motion, contacts = keep_apart(moved, motion, template.gaze)
+    result = motion.copy()
+    for row, other in enumerate(template.minus):
+        if other >= 0:
+            result[row] -= motion[other]
+    back = frame.inverse()
+    shapes = {name: back.apply_vectors(result[row][own]) for row, name in enumerate(template.names)}
+    return Transferred(shapes, frame, skin, found, contacts)
+
+
+def _skin_surface(vertices: NDArray, faces: NDArray, pieces: tuple[Piece, ...]) -> tuple[NDArray, Surface]:
+    """Return the skin's vertices (n,) among all, and its surface over them."""
+    triangles = faces[np.concatenate([piece.faces for piece in pieces if piece.kind == "skin"])]
+    flat = (triangles == np.roll(triangles, 1, axis=1)).any(axis=1)         # what welding made lines of
+    rows, local = np.unique(triangles[~flat], return_inverse=True)
+    return rows, Surface(vertices[rows], local.reshape(-1, 3).astype(np.int32))
+
+
+def _skin_places(landmarks: Landmarks, own: NDArray, rows: NDArray, surface: Surface, places: Mapping[str, NDArray],
+                 template: Template) -> dict[str, tuple[NDArray, NDArray]]:
+    """Return the landmarks as vertices of the skin and weights: their own triangle where that is skin, else the nearest
+    place (brows are often pieces of their own)."""
+    local = np.full(own.max() + 1, -1)
+    local[rows] = np.arange(len(rows))
+    result, elsewhere = {}, []
+    for name, corners, weights in zip(landmarks.names, landmarks.corners, landmarks.barycentric, strict=True):
+        if name not in template.places:
+            continue
+        here = local[own[corners]]
+        if (here[weights > 0] >= 0).all():
+            result[name] = (np.maximum(here, 0), weights)
+        else:
+            elsewhere.append(name)
+    if elsewhere:
+        feet = ClosestPoints(surface)(np.array([places[name] for name in elsewhere]))
+        result |= {name: (surface.faces[face], weights)
+                   for name, face, weights in zip(elsewhere, feet.faces, feet.weights, strict=True)}
+    return result

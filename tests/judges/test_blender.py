@@ -1,0 +1,44 @@
+"""Blender imports the shapes by name and value. Optional: ``FACEGEN_BPY`` names a Python that has bpy 4.5."""
+
+from __future__ import annotations
+
+import importlib.util
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from rigged import written
+
+PYTHON = os.environ.get("FACEGEN_BPY") or (sys.executable if importlib.util.find_spec("bpy") else None)
+
+
+@pytest.mark.skipif(PYTHON is None, reason="bpy is not installed; FACEGEN_BPY may name a Python that has it")
+@pytest.mark.parametrize(("kind", "quantise"), [
+    ("obj", False), ("obj", True), ("instanced", False), ("morphing", False), ("quantised", False),
+    ("transformed", False), ("seams", False), ("skin", False)])
+def test_shape_keys(tmp_path, kind, quantise):
+    path, avatar, shapes = written(kind, tmp_path, quantise=quantise)
+    done = subprocess.run([PYTHON, str(Path(__file__).with_name("blender_look.py")), str(path)], capture_output=True,
+                          text=True, timeout=300, check=False)
+    assert done.returncode == 0, done.stdout + done.stderr
+    found = json.loads(next(line for line in done.stdout.splitlines() if line.startswith("FOUND"))[6:])
+    expected = {**avatar.shapes, **shapes}
+    assert {name for one in found.values() for name in one["keys"]} == set(expected)
+    # Blender's axes: x as in glTF, y into the picture, z up.
+    turn = np.array([[1, 0, 0], [0, 0, -1], [0, 1, 0]])
+    points, size = avatar.mesh.vertices @ turn.T, np.ptp(avatar.mesh.vertices, axis=0).max()
+    assert set(avatar.mesh.parts) <= set(found)
+    for part, one in found.items():
+        # Blender shows nodes that stand in no scene, too, and puts a skinned mesh into its bind pose.
+        if part not in avatar.mesh.parts or kind == "skin":
+            continue
+        away = np.linalg.norm(np.array(one["rest"])[:, None] - points[None], axis=2)
+        assert away.min(axis=1).max() < 1e-5 * size
+        rows = away.argmin(axis=1)
+        for name, delta in one["keys"].items():
+            if kind != "seams":     # there, places are shared by vertices that move on their own
+                np.testing.assert_allclose(delta, expected[name][rows] @ turn.T, atol=2e-5 * size)

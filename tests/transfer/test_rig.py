@@ -1,0 +1,114 @@
+"""From an avatar's file to a file with blendshapes, and back as a face."""
+
+import numpy as np
+import pytest
+
+from facegen.blendshapes.recipes import shape_sets
+from facegen.cli import main
+from facegen.errors import FileError, InputError
+from facegen.face.face import load_face
+from facegen.fileio.avatar import load_avatar
+from facegen.geometry.mesh import Mesh
+from facegen.transfer.landmarks import Landmarks
+from facegen.transfer.rig import avatar_names, rig
+from facegen.transfer.transfer import transfer
+
+
+@pytest.fixture(scope="module", params=avatar_names())
+def rigged(request, tmp_path_factory):
+    return rig(request.param, tmp_path_factory.mktemp("rig") / f"{request.param}.glb", sets=["units", "arkit"])
+
+
+@pytest.fixture(scope="module")
+def face(rigged):
+    return load_face(rigged.path)
+
+
+def test_every_shape_that_was_asked_for_is_in_the_file(rigged):
+    names = set(load_avatar(rigged.path).shapes)
+    assert names == set(rigged.names) == set(shape_sets(["units", "arkit"]))
+
+
+def test_a_rigged_avatar_is_a_face(rigged, face):
+    assert np.array_equal(face.pose({}), face.mesh().vertices)
+    smile = face.landmark_points(face.pose("12"))
+    rest = face.landmark_points(face.mesh().vertices)
+    for side, outward in (("L", 1), ("R", -1)):
+        corner = smile[f"mouth_corner_{side}"] - rest[f"mouth_corner_{side}"]
+        assert corner[1] > 1.0                                  # up and out, mm on a human-sized head
+        assert outward * corner[0] > 1.0
+
+
+def test_the_jaw_opens_the_mouth_and_teeth_go_with_their_bone(rigged, face):
+    rest, opened = face.landmark_points(face.mesh().vertices), face.landmark_points(face.pose("27"))
+    gap = (opened["mouth_inner_top"] - opened["mouth_inner_bottom"])[1]
+    width = np.linalg.norm(rest["mouth_corner_L"] - rest["mouth_corner_R"])
+    assert 0.3 < gap / width < 1.1
+    mesh = face.mesh()
+    moved = np.linalg.norm(face.pose("27") - mesh.vertices, axis=1)
+    upper, lower = (np.unique(mesh.faces[[mesh.parts[p].startswith(part) for p in mesh.face_parts]])
+                    for part in ("teeth_upper", "teeth_lower"))
+    assert moved[upper].max() < 1e-3
+    assert moved[lower].min() > 3
+
+
+def test_one_side_leaves_the_other_as_alone_as_on_the_template(rigged, template):
+    mesh, frame = load_avatar(rigged.path).mesh, rigged.found.frame
+    x = frame.apply(mesh.vertices)[:, 0]
+    shapes = load_avatar(rigged.path).shapes
+    for name in ("AU12_L", "AU2_L", "AU6_L", "AU10_L"):
+        moved = np.linalg.norm(shapes[name], axis=1)
+        row = template.names.index(f"L{name[2:-2]}")
+        own, at = np.linalg.norm(template.motion[row], axis=1), template.surface.vertices[:, 0]
+        theirs = own[at < -12].mean() / own[at > 12].mean()
+        assert moved[x < -12].mean() < (0.03 + 1.5 * theirs) * moved[x > 12].mean(), name
+
+
+def test_a_template_transferred_to_itself_gives_its_skin(template):
+    """Turned, scaled and moved copies too: the frame is found and undone."""
+    turn = np.array([[0.0, 0, 1], [1, 0, 0], [0, 1, 0]])
+    mesh = load_face().mesh(2)
+    skin = np.isin(mesh.face_parts, [0])
+    copy = Mesh.of(0.01 * mesh.vertices @ turn.T + [5, 6, 7], mesh.faces[skin])
+    names = tuple(template.places)
+    corners = np.array([template.places[name][0] for name in names])
+    weights = np.array([template.places[name][1] for name in names])
+    landmarks = Landmarks(names, np.zeros(len(names), int), corners, weights)
+    found = transfer(copy, landmarks, template)
+    n = len(template.surface.vertices)
+    for row in (0, template.names.index("27"), template.names.index("L12")):
+        wanted = 0.01 * template.motion[row] @ turn.T
+        assert np.abs(found.shapes[template.names[row]][:n] - wanted).max() < 1e-6 * 0.01 * template.height
+
+
+@pytest.mark.parametrize(("arguments", "message"), [
+    ({"avatar": "cartoo"}, "did you mean 'cartoon'"),
+    ({"avatar": "nobody.obj", "landmarks": "x.yaml"}, "nobody.obj"),
+    ({"sets": ["arkits"]}, "did you mean 'arkit'"),
+    ({"sets": []}, "expected one or more of units"),
+    ({"method": "sumners"}, "did you mean 'sumner'"),
+    ({"opening": 0.0}, "opening: expected a factor"),
+    ({"pieces": {"hat": "skull"}}, "hat"),
+])
+def test_what_cannot_be_done_is_said_and_nothing_is_written(tmp_path, arguments, message):
+    with pytest.raises(InputError, match=message):
+        rig(**{"avatar": "cartoon", "output": tmp_path / "a.glb", "sets": ["vrm"], **arguments})
+    assert not list(tmp_path.iterdir())
+
+
+def test_landmarks_are_asked_for(tmp_path):
+    (tmp_path / "a.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
+    with pytest.raises(InputError, match="landmarks: expected the file"):
+        rig(tmp_path / "a.obj", tmp_path / "a.glb")
+    with pytest.raises(FileError):
+        rig(tmp_path / "a.obj", tmp_path / "a.glb", landmarks=tmp_path / "none.yaml")
+
+
+def test_the_command(tmp_path, capsys):
+    out = tmp_path / "c.glb"
+    assert main(["rig", "cartoon", "-o", str(out), "--set", "vrm", "--no-normals"]) == 0
+    assert "18 shapes" in capsys.readouterr().out or out.exists()
+    assert main(["render", "happiness", "--face", str(out), "-o", str(tmp_path / "c.png"), "--size", "64"]) == 0
+    assert main(["rig", "cartoon"]) == 2
+    assert main(["rig", "cartoon", "-o", str(out), "--piece", "cap"]) == 2
+    assert "PART=KIND" in capsys.readouterr().err

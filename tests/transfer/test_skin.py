@@ -1,0 +1,84 @@
+"""Laws of the transfer on copies of the template, and the three published methods beside ours."""
+
+import numpy as np
+import pytest
+
+from facegen.geometry.operators import Surface
+from facegen.transfer.baselines import PAPER
+from facegen.transfer.skin import lay_skin
+from facegen.transfer.template import places_on
+
+
+def test_a_template_transferred_to_itself_gives_itself(template):
+    skin = lay_skin(template, template.surface, template.places)
+    assert np.abs(skin.registered - template.surface.vertices).max() < 1e-9
+    assert np.abs(skin.motion() - template.motion).max() < 1e-6 * template.height
+
+
+def errors(found, true):
+    """Return the RMS error of all shapes and of each, as shares of the motion."""
+    e, t = ((x**2).sum(axis=(1, 2)) for x in (found - true, true))
+    return np.sqrt(e.sum() / t.sum()), np.sqrt(e / t)
+
+
+# A few gazes move the lids by tenths of a millimetre only, where the cornea lifts them; of these no share is asked.
+SLIGHT = {"61", "62", "65", "66"}
+
+
+@pytest.mark.parametrize(("share", "most"), [(0.3, 0.06), (0.4, 0.06), (1.0, 0.03), (2.0, 0.03)])
+def test_other_triangles_move_as_the_template_does(template, remeshed, share, most):
+    surface, true = remeshed(share)
+    found = lay_skin(template, surface, places_on(surface, template.landmarks)).motion()
+    whole, each = errors(found, true)
+    assert whole < most
+    assert np.percentile(each[~np.isin(template.names, list(SLIGHT))], 99) < 0.1
+    assert set(np.array(template.names)[each > 0.15]) <= SLIGHT
+    slight = np.isin(template.names, list(SLIGHT))
+    assert np.abs(found - true)[slight].max() < 2.0
+
+
+def test_ours_is_nearer_to_the_truth_than_the_published_methods(template, remeshed):
+    surface, true = remeshed(0.4)
+    skin = lay_skin(template, surface, places_on(surface, template.landmarks))
+    ours, sumner, cloning, paper = (errors(skin.motion(*how), true)[0] for how in (
+        ("landmarks",), ("sumner",), ("cloning",), ("landmarks", PAPER)))
+    assert ours < 0.5 * min(sumner, cloning, paper)
+    assert paper > 0.2
+
+
+@pytest.mark.parametrize("method", ["sumner", "cloning", "landmarks"])
+def test_no_motion_gives_none(template, method):
+    from dataclasses import replace
+
+    still = replace(template, motion=np.zeros_like(template.motion[:2]), jaw=np.zeros((2, 3)), gaze=np.zeros((2, 4)),
+                    names=("one", "other"), minus=(-1, -1))
+    assert np.abs(lay_skin(still, still.surface, still.places).motion(method)).max() < 1e-12
+
+
+def test_lips_landmarks_on_the_wrong_lip_are_settled(template, remeshed):
+    surface, true = remeshed(1.0)
+    places = places_on(surface, template.landmarks)
+    places["mouth_inner_bottom"] = places["mouth_inner_top"]        # where lips touch, a click may land on either
+    found = lay_skin(template, surface, places).motion()
+    assert errors(found, true)[0] < 0.03
+
+
+def test_rigid_parts_stay_rigid_in_the_published_method(template):
+    """What does not deform on the template does not on the avatar: the back of the head keeps its shape."""
+    skin = lay_skin(template, template.surface, template.places)
+    found = skin.motion("sumner")
+    back = template.surface.vertices[:, 2] < -100
+    found_back, true_back = (m[:, back] - m[:, back].mean(axis=1, keepdims=True) for m in (found, template.motion))
+    assert np.abs(found_back - true_back).max() < 0.05
+    assert errors(found, template.motion)[0] < 0.01
+
+
+def test_a_stretched_head_keeps_sides_apart(template):
+    wide = Surface(template.surface.vertices * [1.2, 0.9, 1.1], template.surface.faces)
+    found = lay_skin(template, wide, template.places).motion()
+    left = [i for i, name in enumerate(template.names) if name.startswith("L")]
+    far = {True: wide.vertices[:, 0] > 20, False: wide.vertices[:, 0] < -20}
+    for i in left:
+        own, other = (np.linalg.norm(found[i][far[k]], axis=1).mean() for k in (True, False))
+        truth = [np.linalg.norm(template.motion[i][far[k]], axis=1).mean() for k in (True, False)]
+        assert other < max(0.03, 1.3 * truth[1] / truth[0]) * own
