@@ -1,0 +1,48 @@
+"""Write an avatar: OBJ with parts and materials, MTL with colours, and the landmarks."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from facegen.fileio.obj import format_obj
+from facegen.geometry.mesh import Mesh
+
+SOURCE = "own work of the facegen authors, MIT"
+
+
+def save_avatar(folder: Path, name: str, mesh: Mesh, colours: Mapping[str, tuple[int, int, int]],
+                landmarks: Mapping[str, str], *, about: str, decimals: int) -> None:
+    """Write ``name.obj``, ``name.mtl`` and ``landmarks.yaml``. colours: sRGB 0..255 of every material."""
+    text = format_obj(mesh, comment=f"facegen: {about}\nSource: {SOURCE}, made by author.py.", decimals=decimals)
+    head, _, rest = text.partition("\nv ")
+    (folder / f"{name}.obj").write_text(f"{head}\nmtllib {name}.mtl\nv {rest}", encoding="utf-8")
+    lines = [f"# facegen: {about} Source: {SOURCE}."]
+    for material in mesh.materials:
+        shine = 0.6 if material in ("iris", "pupil", "limbus", "sclera") else 0.05
+        kd = " ".join(f"{c / 255:.4f}" for c in colours[material])
+        lines += [f"newmtl {material}", f"Kd {kd}", f"Ks {shine} {shine} {shine}", "Ns 40", ""]
+    (folder / f"{name}.mtl").write_text("\n".join(lines), encoding="utf-8")
+    lines = [f"# Landmarks of {name}.obj: a number is a vertex (0-based), three numbers a place, snapped to the surface.",
+             "# Left and right are the animal's own.", f"source: {SOURCE}", f"mesh: {name}.obj", "landmarks:"]
+    lines += [f"  {mark}: {where}" for mark, where in landmarks.items()]
+    (folder / "landmarks.yaml").write_text("\n".join(lines) + "\n", encoding="utf-8")
+
+
+def both_sides(mesh: Mesh, left: Mapping[str, NDArray | str], decimals: int) -> dict[str, str]:
+    """Return landmark entries for both sides from those of the left half, before the head is bent out of symmetry.
+
+    left: name (``_L`` or of the middle) -> place (3,), which becomes the vertex there, or else a point. Those that end in
+    ``eye_center_L`` lie on the eyeball.
+    """
+    out = {}
+    for name, place in left.items():
+        for side, sign in (("_L", 1.0), ("_R", -1.0)) if name.endswith("_L") else (("", 1.0),):
+            at = np.asarray(place, float) * (sign, 1.0, 1.0)
+            key = name.removesuffix("_L") + side
+            rows = mesh.part_vertices(f"eye{side}" if name.startswith("eye_center") else "skin")
+            out[key] = int(rows[np.argmin(np.linalg.norm(mesh.vertices[rows] - at, axis=1))])
+    return {key: str(row) for key, row in out.items()}
