@@ -1,8 +1,8 @@
 """Author the cat: a mesh of free triangles with rings round eyes, mouth, ears and nostrils.
 
-    python meshes/avatars/cat/author.py
+    python meshes/avatars/cat/author.py [FOLDER]
 
-writes ``cat.obj``, ``cat.mtl`` and ``landmarks.yaml`` beside this script. Centimetres; +x the cat's left, +y up, +z
+writes ``cat.obj``, ``cat.mtl`` and ``landmarks.yaml`` beside this script, or into the folder. Centimetres; +x the cat's left, +y up, +z
 forward. The head is modelled in clay (model.py); everything here is about its surface: what runs along a loop or a
 line, how dense the triangles are, which colour they have.
 """
@@ -10,6 +10,7 @@ line, how dense the triangles are, which colour they have.
 from __future__ import annotations
 
 import sys
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -18,7 +19,7 @@ HERE = Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE.parent / "kit"))
 
 import model  # noqa: E402
-from clay import Clay, curve, stroke  # noqa: E402
+from clay import Clay, curve  # noqa: E402
 from cover import cover, directions, in_polygon, inside, scatter, walk  # noqa: E402
 from eyes import almond, ellipse, eyeball, lid_rings  # noqa: E402
 from mouth import gum_and_teeth, lip_rows, tongue  # noqa: E402
@@ -29,16 +30,30 @@ from sheet import Sheet  # noqa: E402
 from facegen.geometry.mesh import Mesh, merge  # noqa: E402
 
 COLOURS = {
-    "fur": (214, 148, 88), "fur_light": (242, 234, 222), "fur_pale": (232, 184, 132), "fur_dark": (172, 104, 56), "rim": (66, 44, 38),
-    "nose": (214, 132, 126), "inner_pink": (226, 178, 164), "lips": (112, 72, 66), "mouth": (120, 52, 50),
-    "nostril": (92, 50, 46), "sclera": (222, 214, 190), "iris": (146, 176, 84), "iris_edge": (104, 132, 58), "limbus": (44, 48, 28),
-    "pupil": (12, 12, 12), "teeth": (246, 240, 224), "gums": (196, 110, 108), "tongue": (214, 122, 120),
+    "fur": (214, 148, 88),
+    "fur_light": (242, 234, 222),
+    "fur_pale": (232, 184, 132),
+    "fur_dark": (172, 104, 56),
+    "rim": (66, 44, 38),
+    "nose": (214, 132, 126),
+    "inner_pink": (226, 178, 164),
+    "lips": (112, 72, 66),
+    "mouth": (120, 52, 50),
+    "nostril": (92, 50, 46),
+    "sclera": (222, 214, 190),
+    "iris": (146, 176, 84),
+    "iris_edge": (104, 132, 58),
+    "limbus": (44, 48, 28),
+    "pupil": (12, 12, 12),
+    "teeth": (246, 240, 224),
+    "gums": (196, 110, 108),
+    "tongue": (214, 122, 120),
     "whiskers": (248, 246, 240),
 }
-LID = 28            # vertices round an eye
-LIP = 9             # quads along half a lip
-EAR = 20            # vertices round an ear
-GAP = 0.012         # between the lips
+LID = 28  # vertices round an eye
+LIP = 9  # quads along half a lip
+EAR = 20  # vertices round an ear
+GAP = 0.012  # between the lips
 DECIMALS = 4
 
 OPENING = almond(LID, 60, 39, 35, point=0.4, inner_drop=9, lean=0.10)
@@ -46,18 +61,38 @@ LID_RINGS = {"offsets": (0.4, 0.2, 0.07), "crest": 1.05, "inside": 1.02, "pocket
 LIP_OFFSETS = (0.3, 0.07)
 # Colours by their outlines seen from the front, left half: (x, y), and the least z.
 PATCHES = (
-    ("nose", 3.9, ((-0.1, -0.48), (0.42, -0.52), (0.66, -0.7), (0.56, -0.98), (0.3, -1.1), (0.1, -1.32), (-0.1, -1.36))),
+    (
+        "nose",
+        3.9,
+        ((-0.1, -0.48), (0.42, -0.52), (0.66, -0.7), (0.56, -0.98), (0.3, -1.1), (0.1, -1.32), (-0.1, -1.36)),
+    ),
     ("fur_dark", -1.0, ((-0.1, 2.3), (0.2, 2.3), (0.27, 3.1), (0.2, 4.0), (-0.1, 4.1))),
     ("fur_dark", -1.0, ((0.68, 2.3), (1.12, 2.2), (1.4, 3.1), (1.36, 3.8), (0.95, 3.9), (0.85, 3.1))),
-    ("fur_light", -0.5, ((-0.1, 1.25), (0.14, 1.1), (0.3, 0.2), (0.55, -0.4), (1.05, -0.75), (1.9, -1.15), (2.5, -1.75),
-                         (2.6, -2.6), (2.3, -3.4), (2.0, -9.0), (-0.1, -9.0))),
+    (
+        "fur_light",
+        -0.5,
+        (
+            (-0.1, 1.25),
+            (0.14, 1.1),
+            (0.3, 0.2),
+            (0.55, -0.4),
+            (1.05, -0.75),
+            (1.9, -1.15),
+            (2.5, -1.75),
+            (2.6, -2.6),
+            (2.3, -3.4),
+            (2.0, -9.0),
+            (-0.1, -9.0),
+        ),
+    ),
 )
 
 
 def spacing(points: NDArray) -> NDArray:
     """Return the length of edges at points (n, 3): fine round the features, coarse at the back."""
-    features = np.array([model.EYE.centre + [0, 0, 0.8], model.NOSE_TIP, (1.2, -2.2, 4.2), (0, -2.2, 4.8),
-                         (0.5, -1.0, 4.6)])
+    features = np.array(
+        [np.add(model.EYE.centre, [0, 0, 0.8]), model.NOSE_TIP, (1.2, -2.2, 4.2), (0, -2.2, 4.8), (0.5, -1.0, 4.6)]
+    )
     reach = np.array([1.5, 0.5, 0.6, 0.5, 0.3])
     away = np.linalg.norm(points[:, None] - features, axis=2) - reach
     return np.clip(0.24 + 0.16 * np.maximum(away.min(axis=1), 0), 0.24, 0.85)
@@ -74,23 +109,35 @@ def ear_ring(height: float, count: int = EAR) -> NDArray:
     depth = -hollow * np.abs(s) ** 0.8 - np.where(s > 0, 0.0, thick * (0.6 + 0.4 * np.abs(s)))
     depth[np.abs(s) < 1e-9] = -0.3 * thick
     lean = (0.35 * height**2 - 0.25 * np.sin(np.pi * height)) * wide
-    return (model.EAR_BASE + height * model.EAR_HEIGHT * axis + lean + width * np.cos(t)[:, None] * wide
-            + depth[:, None] * front)
+    return (
+        model.EAR_BASE
+        + height * model.EAR_HEIGHT * axis
+        + lean
+        + width * np.cos(t)[:, None] * wide
+        + depth[:, None] * front
+    )
 
 
 def ear_loop(clay: Clay) -> NDArray:
     """Return the ring where the ear meets the head."""
     t = 2 * np.pi * np.arange(EAR) / EAR
     _, wide, front = model.EAR_AXES
-    flat = model.EAR_BASE + 1.85 * np.cos(t)[:, None] * wide + np.where(np.sin(t) > 0, 0.55, 1.0)[:, None] * np.sin(t)[:, None] * front
+    flat = (
+        model.EAR_BASE
+        + 1.85 * np.cos(t)[:, None] * wide
+        + np.where(np.sin(t) > 0, 0.55, 1.0)[:, None] * np.sin(t)[:, None] * front
+    )
     return clay.onto(flat)
 
 
 def nostril_loop(clay: Clay, size: float) -> NDArray:
     t = 2 * np.pi * np.arange(8) / 8
     x, y, z = model.NOSTRIL
-    return clay.onto(np.stack([x + 0.17 * size * np.cos(t), y + 0.10 * size * np.sin(t) + 0.05 * size * np.cos(t),
-                               np.full(8, z)], axis=1))
+    return clay.onto(
+        np.stack(
+            [x + 0.17 * size * np.cos(t), y + 0.10 * size * np.sin(t) + 0.05 * size * np.cos(t), np.full(8, z)], axis=1
+        )
+    )
 
 
 def neck_loop(clay: Clay) -> NDArray:
@@ -154,8 +201,7 @@ def middle_line(clay: Clay, fixed: NDArray, rows: dict[str, NDArray]) -> NDArray
 def patch_edge(clay: Clay, outline: tuple, least: float, fixed: NDArray, rows: dict[str, NDArray]) -> NDArray:
     """Return points along the edge of a colour."""
     corners = np.array([*outline, outline[0]], float)
-    flat = np.concatenate([a + np.linspace(0, 1, 40, endpoint=False)[:, None] * (b - a)
-                           for a, b in zip(corners[:-1], corners[1:], strict=True)])
+    flat = np.concatenate([a + np.linspace(0, 1, 40, endpoint=False)[:, None] * (b - a) for a, b in pairwise(corners)])
     flat = flat[(flat[:, 0] > 0.02) & (clay(np.column_stack([flat, np.full(len(flat), least)])) < -0.1)]
     line = clay.shoot(np.column_stack([flat, np.full(len(flat), least)]), np.array([[0.0, 0.0, 1.0]]), 8.0)
     line = line[outside(line, fixed, rows)]
@@ -200,8 +246,14 @@ def add_mouth(sheet: Sheet, clay: Clay, loop: NDArray, rows: list[NDArray], slit
     bow = np.sqrt(1 - share**2)[:, None]
     up = np.array([0.0, 1.0, 0.0])
     last = numbers[-1]
-    for depth, shrink, high, low in ((0.12, 1.0, 0.012, 0.012), (0.3, 0.97, 0.10, 0.10), (0.5, 0.93, 0.5, 0.42),
-                                     (1.1, 0.86, 0.62, 0.62), (2.1, 0.8, 0.66, 0.66), (3.1, 0.7, 0.5, 0.6)):
+    for depth, shrink, high, low in (
+        (0.12, 1.0, 0.012, 0.012),
+        (0.3, 0.97, 0.10, 0.10),
+        (0.5, 0.93, 0.5, 0.42),
+        (1.1, 0.86, 0.62, 0.62),
+        (2.1, 0.8, 0.66, 0.66),
+        (3.1, 0.7, 0.5, 0.6),
+    ):
         inward = np.array([0.0, -1.9, 0.5]) - slit
         inward = inward / np.linalg.norm(inward, axis=1, keepdims=True)
         base = slit + depth * np.minimum(1.0, 1.6 - share)[:, None] * inward
@@ -212,7 +264,7 @@ def add_mouth(sheet: Sheet, clay: Clay, loop: NDArray, rows: list[NDArray], slit
         sheet.band(last, row, "lips" if depth < 0.2 else "mouth", closed=False)
         last = row
     back = sheet.row([0.0, *(sheet.at(last)[[0, -1], 1:].mean(axis=0) - [0, 0.4])])[0]
-    sheet.triangles([(a, b, back) for a, b in zip(last[:-1], last[1:], strict=True)], "mouth")
+    sheet.triangles([(a, b, back) for a, b in pairwise(last)], "mouth")
 
 
 def add_ear(sheet: Sheet, loop: NDArray) -> None:
@@ -234,13 +286,17 @@ def whiskers(clay: Clay) -> Sheet:
     sheet = Sheet("whiskers")
     for row in range(3):
         for place in range(2):
-            root = clay.onto(np.array([[0.98 + 0.28 * place, -1.42 - 0.26 * row - 0.03 * place, 4.6 - 0.25 * place]]))[0]
+            root = clay.onto(np.array([[0.98 + 0.28 * place, -1.42 - 0.26 * row - 0.03 * place, 4.6 - 0.25 * place]]))[
+                0
+            ]
             away = np.array([1.0, 0.16 - 0.2 * row, 0.12 - 0.22 * place])
             t = np.linspace(0, 1, 7)[:, None]
             spine = root + 4.3 * (1 - 0.12 * row) * (t * away + t**2 * np.array([-0.06, -0.12, -0.2]))
             ring = 2 * np.pi * np.arange(3) / 3
-            rings = [p + r * np.stack([0 * ring, np.cos(ring), np.sin(ring)], axis=1)
-                     for p, r in zip(spine, np.linspace(0.03, 0.012, 7), strict=True)]
+            rings = [
+                p + r * np.stack([0 * ring, np.cos(ring), np.sin(ring)], axis=1)
+                for p, r in zip(spine, np.linspace(0.03, 0.012, 7), strict=True)
+            ]
             rows = sheet.tube(rings, "whiskers")
             sheet.cap(rows[0], "whiskers")
             sheet.cap(rows[-1], "whiskers")
@@ -253,21 +309,63 @@ def inner_parts() -> list[Mesh]:
     pupil = ellipse(n, 8.5, 31)
     outlines = [0.5 * pupil, pupil, 0.5 * pupil + 0.5 * ellipse(n, 40, 44), ellipse(n, 52, 52), ellipse(n, 58, 58)]
     materials = ["pupil", "pupil", "iris", "iris_edge", "limbus", "sclera"]
-    eyes = [eyeball(name, model.BALL, outlines, materials, mirror=right)
-            for name, right in (("eye_L", False), ("eye_R", True))]
+    eyes = [
+        eyeball(name, model.BALL, outlines, materials, mirror=right)
+        for name, right in (("eye_L", False), ("eye_R", True))
+    ]
     fang, small = (0.25, 0.25, 0.6), (0.15, 0.13, 0.16)
-    upper = [(0.5 + s * x, *size) for s in (-1, 1) for x, size in
-             ((0.03, small), (0.085, small), (0.14, small), (0.215, fang), (0.33, (0.2, 0.15, 0.22)), (0.4, (0.3, 0.16, 0.28)))]
-    lower = [(0.5 + s * x, *size) for s in (-1, 1) for x, size in
-             ((0.03, small), (0.085, small), (0.165, (0.23, 0.23, 0.5)), (0.3, (0.2, 0.15, 0.22)), (0.38, (0.3, 0.16, 0.26)))]
-    arch_upper = [(1.05, -1.72, 2.2), (0.92, -1.72, 3.0), (0.58, -1.7, 3.55), (0, -1.66, 3.8), (-0.58, -1.7, 3.55),
-                  (-0.92, -1.72, 3.0), (-1.05, -1.72, 2.2)]
-    arch_lower = [(0.92, -2.62, 2.0), (0.8, -2.64, 2.8), (0.46, -2.62, 3.3), (0, -2.6, 3.5), (-0.46, -2.62, 3.3),
-                  (-0.8, -2.64, 2.8), (-0.92, -2.62, 2.0)]
-    return [*eyes, gum_and_teeth("teeth_upper", arch_upper, (0, -1, 0), 0.19, upper, lean=0.05).mesh(),
-            gum_and_teeth("teeth_lower", arch_lower, (0, 1, 0), 0.17, lower, lean=0.1).mesh(),
-            tongue("tongue", [(0, -2.5, 1.0), (0, -2.2, 1.9), (0, -2.24, 2.7), (0, -2.4, 3.35)], [0.5, 0.6, 0.62, 0.6, 0.5, 0.3],
-                   [0.25, 0.24, 0.2, 0.16, 0.12, 0.07]).mesh()]
+    upper = [
+        (0.5 + s * x, *size)
+        for s in (-1, 1)
+        for x, size in (
+            (0.03, small),
+            (0.085, small),
+            (0.14, small),
+            (0.215, fang),
+            (0.33, (0.2, 0.15, 0.22)),
+            (0.4, (0.3, 0.16, 0.28)),
+        )
+    ]
+    lower = [
+        (0.5 + s * x, *size)
+        for s in (-1, 1)
+        for x, size in (
+            (0.03, small),
+            (0.085, small),
+            (0.165, (0.23, 0.23, 0.5)),
+            (0.3, (0.2, 0.15, 0.22)),
+            (0.38, (0.3, 0.16, 0.26)),
+        )
+    ]
+    arch_upper = [
+        (1.05, -1.72, 2.2),
+        (0.92, -1.72, 3.0),
+        (0.58, -1.7, 3.55),
+        (0, -1.66, 3.8),
+        (-0.58, -1.7, 3.55),
+        (-0.92, -1.72, 3.0),
+        (-1.05, -1.72, 2.2),
+    ]
+    arch_lower = [
+        (0.92, -2.62, 2.0),
+        (0.8, -2.64, 2.8),
+        (0.46, -2.62, 3.3),
+        (0, -2.6, 3.5),
+        (-0.46, -2.62, 3.3),
+        (-0.8, -2.64, 2.8),
+        (-0.92, -2.62, 2.0),
+    ]
+    return [
+        *eyes,
+        gum_and_teeth("teeth_upper", arch_upper, (0, -1, 0), 0.19, upper, lean=0.05).mesh(),
+        gum_and_teeth("teeth_lower", arch_lower, (0, 1, 0), 0.17, lower, lean=0.1).mesh(),
+        tongue(
+            "tongue",
+            [(0, -2.5, 1.0), (0, -2.2, 1.9), (0, -2.24, 2.7), (0, -2.4, 3.35)],
+            [0.5, 0.6, 0.62, 0.6, 0.5, 0.3],
+            [0.25, 0.24, 0.2, 0.16, 0.12, 0.07],
+        ).mesh(),
+    ]
 
 
 def landmarks(clay: Clay, mesh: Mesh) -> dict[str, str]:
@@ -279,18 +377,34 @@ def landmarks(clay: Clay, mesh: Mesh) -> dict[str, str]:
     side = lambda y, z: clay.shoot(np.array([0.0, y, z]), np.array([[1.0, 0.0, 0.0]]), 8.0)[0]  # noqa: E731
     q, m = LID // 4, LIP
     places = {
-        "brow_inner_L": front(0.85, 1.95), "brow_mid_L": front(1.85, 2.35), "brow_outer_L": front(3.0, 1.85),
-        "eye_inner_L": lids[2 * q], "eye_outer_L": lids[0], "eye_upper_L": lids[q], "eye_lower_L": lids[3 * q],
-        "eye_upper_outer_L": lids[q // 2], "eye_upper_inner_L": lids[q + q // 2 + 1],
-        "eye_lower_inner_L": lids[2 * q + q // 2], "eye_lower_outer_L": lids[3 * q + q // 2 + 1],
+        "brow_inner_L": front(0.85, 1.95),
+        "brow_mid_L": front(1.85, 2.35),
+        "brow_outer_L": front(3.0, 1.85),
+        "eye_inner_L": lids[2 * q],
+        "eye_outer_L": lids[0],
+        "eye_upper_L": lids[q],
+        "eye_lower_L": lids[3 * q],
+        "eye_upper_outer_L": lids[q // 2],
+        "eye_upper_inner_L": lids[q + q // 2 + 1],
+        "eye_lower_inner_L": lids[2 * q + q // 2],
+        "eye_lower_outer_L": lids[3 * q + q // 2 + 1],
         "eye_center_L": model.BALL.on_ball(np.zeros((1, 2)))[0],
-        "nose_tip": front(0.0, -0.72), "nose_bridge": front(0.0, 0.6), "nose_wing_L": front(0.62, -0.85),
+        "nose_tip": front(0.0, -0.72),
+        "nose_bridge": front(0.0, 0.6),
+        "nose_wing_L": front(0.62, -0.85),
         "nose_base": front(0.0, -1.3),
-        "mouth_corner_L": lips[-1][m], "mouth_top": lips[1][0], "mouth_inner_top": lips[-1][0],
-        "mouth_inner_bottom": lips[-1][-1], "mouth_bottom": lips[1][-1],
-        "mouth_upper_L": lips[-1][m // 2], "mouth_lower_L": lips[-1][2 * m - m // 2],
-        "chin": front(0.0, -3.05), "jaw_L": side(-0.9, -0.6), "jaw_angle_L": side(-2.3, -0.2),
-        "temple_L": side(0.9, 0.6), "head_top": clay.shoot(model.CENTRE, np.array([[0.0, 1.0, -0.25]]), 8.0)[0],
+        "mouth_corner_L": lips[-1][m],
+        "mouth_top": lips[1][0],
+        "mouth_inner_top": lips[-1][0],
+        "mouth_inner_bottom": lips[-1][-1],
+        "mouth_bottom": lips[1][-1],
+        "mouth_upper_L": lips[-1][m // 2],
+        "mouth_lower_L": lips[-1][2 * m - m // 2],
+        "chin": front(0.0, -3.05),
+        "jaw_L": side(-0.9, -0.6),
+        "jaw_angle_L": side(-2.3, -0.2),
+        "temple_L": side(0.9, 0.6),
+        "head_top": clay.shoot(model.CENTRE, np.array([[0.0, 1.0, -0.25]]), 8.0)[0],
         "head_back": clay.shoot(np.array([0, 0.6, 0.0]), np.array([[0.0, 0.0, -1.0]]), 8.0)[0],
         "neck": clay.shoot(np.array([0, -4.2, -2.2]), np.array([[0.0, -0.5, 1.0]]), 6.0)[0],
     }
@@ -305,12 +419,30 @@ def build() -> tuple[Mesh, dict[str, str]]:
 
 def both(mesh: Mesh) -> Mesh:
     """Return a piece of the left side together with its mirror image."""
-    return merge([mesh, Mesh(mesh.vertices * (-1, 1, 1), mesh.faces[:, ::-1], mesh.materials, mesh.face_materials,
-                             mesh.parts, mesh.face_parts)])
+    return merge(
+        [
+            mesh,
+            Mesh(
+                mesh.vertices * (-1, 1, 1),
+                mesh.faces[:, ::-1],
+                mesh.materials,
+                mesh.face_materials,
+                mesh.parts,
+                mesh.face_parts,
+            ),
+        ]
+    )
 
 
 if __name__ == "__main__":
     cat, marks = build()
-    save_avatar(HERE, "cat", cat, COLOURS, marks, about="a cat's head. Centimetres, +x its left, +y up, +z forward.",
-                decimals=DECIMALS)
+    save_avatar(
+        Path(sys.argv[1]) if len(sys.argv) > 1 else HERE,
+        "cat",
+        cat,
+        COLOURS,
+        marks,
+        about="a cat's head. Centimetres, +x its left, +y up, +z forward.",
+        decimals=DECIMALS,
+    )
     print(len(cat.vertices), "vertices", len(cat.faces), "triangles")

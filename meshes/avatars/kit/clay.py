@@ -145,8 +145,10 @@ def curve(points: Sequence[ArrayLike], count: int, power: float = 1.0) -> NDArra
     p = np.asarray(points, float)
     p = np.concatenate([[2 * p[0] - p[1]], p, [2 * p[-1] - p[-2]]])
     t = np.linspace(0, 1, 24, endpoint=False)[:, None]
-    pieces = [0.5 * (2 * b + (c - a) * t + (2 * a - 5 * b + 4 * c - d) * t**2 + (3 * b - a - 3 * c + d) * t**3)
-              for a, b, c, d in zip(p[:-3], p[1:-2], p[2:-1], p[3:], strict=True)]
+    pieces = [
+        0.5 * (2 * b + (c - a) * t + (2 * a - 5 * b + 4 * c - d) * t**2 + (3 * b - a - 3 * c + d) * t**3)
+        for a, b, c, d in zip(p[:-3], p[1:-2], p[2:-1], p[3:], strict=True)
+    ]
     fine = np.concatenate([*pieces, p[-2:-1]])
     length = np.concatenate([[0], np.cumsum(np.linalg.norm(np.diff(fine, axis=0), axis=1))])
     where = (1 - (1 - np.linspace(0, 1, count)) ** power) * length[-1]

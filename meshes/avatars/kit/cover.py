@@ -60,7 +60,7 @@ def scatter(candidates: NDArray, spacing: Callable[[NDArray], NDArray], taken: N
     """Return candidates thinned by dart throwing (in their order) to the spacing, clear of the taken points."""
     h = spacing(candidates)
     alive = cKDTree(taken).query(candidates)[0] > _CLEAR * h
-    alive &= candidates[:, 0] > 0.5 * h         # clear of the middle, where the mirrored half begins
+    alive &= candidates[:, 0] > 0.5 * h  # clear of the middle, where the mirrored half begins
     tree = cKDTree(candidates)
     chosen = []
     for i in range(len(candidates)):
@@ -80,8 +80,14 @@ def directions(count: int) -> NDArray:
     return np.stack([r * np.cos(turn), r * np.sin(turn), z], axis=1)[spread]
 
 
-def cover(clay: Clay, centre: NDArray, fixed: NDArray, free: NDArray, holes: Sequence[NDArray],
-          lines: Sequence[tuple[int, int]]) -> tuple[NDArray, NDArray]:
+def cover(
+    clay: Clay,
+    centre: NDArray,
+    fixed: NDArray,
+    free: NDArray,
+    holes: Sequence[NDArray],
+    lines: Sequence[tuple[int, int]],
+) -> tuple[NDArray, NDArray]:
     """Return (vertices (n, 3), faces (m, 3)) of the half x >= 0: ``fixed`` points first, then the ``free`` ones, moved.
 
     holes: loops, each the rows of ``fixed`` on it in order (if it crosses the middle, its half). lines: edges between
@@ -92,7 +98,7 @@ def cover(clay: Clay, centre: NDArray, fixed: NDArray, free: NDArray, holes: Seq
     all_points = np.concatenate([points, mirrored(points[right])])
     d = all_points - centre
     d /= np.linalg.norm(d, axis=1, keepdims=True)
-    edges = set(_middle_edges(points[:len(fixed)] - centre, holes))
+    edges = set(_middle_edges(points[: len(fixed)] - centre, holes))
     for hole in holes:
         ahead = hole[1:] if (points[hole, 0] <= 0).any() else np.roll(hole, -1)
         edges |= {frozenset((int(a), int(b))) for a, b in zip(hole, ahead, strict=False)}
@@ -107,8 +113,11 @@ def cover(clay: Clay, centre: NDArray, fixed: NDArray, free: NDArray, holes: Seq
     twin[right] = np.arange(len(right)) + len(points)
     dropped = np.zeros(len(faces), bool)
     for hole in holes:
-        loop = np.concatenate([hole, [twin[i] if twin[i] >= 0 else i for i in hole[::-1]]]) \
-            if (points[hole, 0] <= 0).any() else hole
+        loop = (
+            np.concatenate([hole, [twin[i] if twin[i] >= 0 else i for i in hole[::-1]]])
+            if (points[hole, 0] <= 0).any()
+            else hole
+        )
         dropped |= np.isin(faces, loop).all(axis=1) & inside(d[loop], middles)
     if (astride & ~dropped).any():
         raise ValueError(f"triangles astride the middle near {all_points[faces[astride & ~dropped][0]].round(2)}")
@@ -124,14 +133,18 @@ def _middle_edges(points: NDArray, holes: Sequence[NDArray]) -> list[frozenset]:
     rows = np.flatnonzero(np.abs(points[:, 0]) < 1e-9)
     rows = rows[np.argsort(np.arctan2(points[rows, 1], points[rows, 2]))]
     hole_of = {int(i): n for n, hole in enumerate(holes) for i in hole}
-    return [frozenset((int(a), int(b))) for a, b in zip(rows, np.roll(rows, -1), strict=True)
-            if hole_of.get(int(a), -1) != hole_of.get(int(b), -2)]
+    return [
+        frozenset((int(a), int(b)))
+        for a, b in zip(rows, np.roll(rows, -1), strict=True)
+        if hole_of.get(int(a), -1) != hole_of.get(int(b), -2)
+    ]
 
 
 def recover(d: NDArray, faces: NDArray, edges: set[frozenset], *, required: bool = True) -> NDArray:
     """Return the triangles on directions (n, 3) after flips that bring back edges which other triangles cut.
 
-    required: ValueError for an edge that cannot be made. After S. W. Sloan, "A fast algorithm for generating constrained Delaunay triangulations", 1993.
+    required: ValueError for an edge that cannot be made. After S. W. Sloan,
+    "A fast algorithm for generating constrained Delaunay triangulations", 1993.
     """
     faces = [tuple(int(i) for i in f) for f in faces]
     beside = _beside(faces)
@@ -140,7 +153,7 @@ def recover(d: NDArray, faces: NDArray, edges: set[frozenset], *, required: bool
         return float(np.cross(d[a], d[b]) @ d[p])
 
     def cuts(p: int, q: int, a: int, b: int) -> bool:
-        return (side(p, q, a) * side(p, q, b) < 0 and side(a, b, p) * side(a, b, q) < 0 and d[p] @ d[a] > 0.5)
+        return side(p, q, a) * side(p, q, b) < 0 and side(a, b, p) * side(a, b, q) < 0 and d[p] @ d[a] > 0.5
 
     for a, b in (sorted(e) for e in edges if not beside.get(e)):
         for _ in range(200):
@@ -151,11 +164,13 @@ def recover(d: NDArray, faces: NDArray, edges: set[frozenset], *, required: bool
                 p, q = edge
                 first, second = beside[edge]
                 c, e = (next(i for i in faces[n] if i not in edge) for n in (first, second))
-                if side(c, e, p) * side(c, e, q) < 0:       # convex: the other diagonal lies inside
+                if side(c, e, p) * side(c, e, q) < 0:  # convex: the other diagonal lies inside
                     _swap(faces, beside, edge)
                     break
         if required and not beside.get(frozenset((a, b))):
-            raise ValueError(f"the edge {a}-{b} of a loop cannot be made: another point lies on it, or it crosses another")
+            raise ValueError(
+                f"the edge {a}-{b} of a loop cannot be made: another point lies on it, or it crosses another"
+            )
     return np.array(faces)
 
 

@@ -31,8 +31,11 @@ class Eye:
         gaze = np.array([np.sin(y) * np.cos(p), np.sin(p), np.cos(y) * np.cos(p)])
         side = np.array([np.cos(y), 0.0, -np.sin(y)])
         up = np.cross(gaze, side)
-        return cls(np.asarray(centre, float), radius,
-                   np.stack([np.cos(r) * side + np.sin(r) * up, np.cos(r) * up - np.sin(r) * side, gaze]))
+        return cls(
+            np.asarray(centre, float),
+            radius,
+            np.stack([np.cos(r) * side + np.sin(r) * up, np.cos(r) * up - np.sin(r) * side, gaze]),
+        )
 
     def on_ball(self, outline: ArrayLike, height: float = 1.0) -> NDArray:
         """Return places (k, 3) at angles (k, 2) from the gaze (radians outwards and up), ``height`` radii out."""
@@ -43,8 +46,16 @@ class Eye:
         return self.centre + height * self.radius * d
 
 
-def almond(count: int, width: float, upper: float, lower: float, *, point: float = 0.5, inner_drop: float = 0.0,
-           lean: float = 0.0) -> NDArray:
+def almond(
+    count: int,
+    width: float,
+    upper: float,
+    lower: float,
+    *,
+    point: float = 0.5,
+    inner_drop: float = 0.0,
+    lean: float = 0.0,
+) -> NDArray:
     """Return an outline (count, 2) in radians from angles in degrees: outer corner first, upper lid next.
 
     width: from the middle to a corner. point: 0 for an ellipse, 1 for sharp corners. inner_drop: how far the inner
@@ -54,7 +65,7 @@ def almond(count: int, width: float, upper: float, lower: float, *, point: float
     x, s = np.cos(t), np.sin(t)
     rise = (1 - point) * np.abs(s) + point * s**2
     rise *= 1 - np.sign(s) * lean * x
-    y = np.where(s > 0, upper, -lower) * rise - inner_drop * np.clip(-x, 0, 1)**4
+    y = np.where(s > 0, upper, -lower) * rise - inner_drop * np.clip(-x, 0, 1) ** 4
     fine = np.radians(np.stack([width * x, y], axis=1))
     half = count // 2
     upper_lid, lower_lid = _evenly(fine[:361], half + 1), _evenly(fine[360:], half + 1)
@@ -73,8 +84,9 @@ def _evenly(points: NDArray, count: int) -> NDArray:
     return np.stack([np.interp(where, length, points[:, i]) for i in range(2)], axis=1)
 
 
-def lid_rings(eye: Eye, clay: Clay, outline: NDArray, offsets: Sequence[float], *, crest: float, inside: float,
-              pocket: float) -> list[NDArray]:
+def lid_rings(
+    eye: Eye, clay: Clay, outline: NDArray, offsets: Sequence[float], *, crest: float, inside: float, pocket: float
+) -> list[NDArray]:
     """Return rings (k, 3) round an opening, the outermost first: on the skin, the margin, then behind the lid.
 
     offsets: distances of the rings on the skin from the margin, the largest first. crest, inside: heights of the margin
@@ -95,8 +107,13 @@ def lid_rings(eye: Eye, clay: Clay, outline: NDArray, offsets: Sequence[float], 
         for _ in range(int(_EVENING * d / max(offsets))):
             ring = clay.onto(0.5 * ring + 0.25 * (np.roll(ring, 1, axis=0) + np.roll(ring, -1, axis=0)), steps=3)
         skin.append(ring)
-    return [*skin, margin, eye.on_ball(1.07 * outline, inside), eye.on_ball((1 + pocket) / 2 * outline, inside),
-            eye.on_ball(pocket * outline, inside)]
+    return [
+        *skin,
+        margin,
+        eye.on_ball(1.07 * outline, inside),
+        eye.on_ball((1 + pocket) / 2 * outline, inside),
+        eye.on_ball(pocket * outline, inside),
+    ]
 
 
 def eyeball(part: str, eye: Eye, outlines: Sequence[NDArray], materials: Sequence[str], *, mirror: bool) -> Mesh:
@@ -110,12 +127,13 @@ def eyeball(part: str, eye: Eye, outlines: Sequence[NDArray], materials: Sequenc
     back = [ellipse(count, a, a) for a in np.linspace(edge, 180, 6)[1:-1]]
     rings = [sheet.row(eye.on_ball(o)) for o in [*outlines, *back]]
     sheet.cap(rings[0], materials[0], eye.on_ball([[0.0, 0.0]]))
-    names = [*materials[1:len(outlines)], *[materials[-1]] * len(back)]
+    names = [*materials[1 : len(outlines)], *[materials[-1]] * len(back)]
     for a, b, name in zip(rings[:-1], rings[1:], names, strict=True):
         sheet.band(a, b, name)
     sheet.cap(rings[-1], materials[-1], eye.on_ball([[0.0, np.pi]]))
     mesh = sheet.mesh()
     if not mirror:
         return mesh
-    return Mesh(mirrored(mesh.vertices), mesh.faces[:, ::-1], mesh.materials, mesh.face_materials, mesh.parts,
-                mesh.face_parts)
+    return Mesh(
+        mirrored(mesh.vertices), mesh.faces[:, ::-1], mesh.materials, mesh.face_materials, mesh.parts, mesh.face_parts
+    )

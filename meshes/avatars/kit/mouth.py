@@ -29,20 +29,27 @@ def lip_rows(slit: NDArray, clay: Clay, offsets: Sequence[float], *, gap: float)
     up = np.cross(normal, along)
     up /= np.linalg.norm(up, axis=1, keepdims=True)
     # Towards the corner the rows fan out round it.
-    fan = 0.9 * (np.arange(k) / k)[:, None]**5
+    fan = 0.9 * (np.arange(k) / k)[:, None] ** 5
     rows = []
     for d in offsets:
         upper, lower = (slit[:k] + d * (sign * np.cos(fan) * up[:k] + np.sin(fan) * along[:k]) for sign in (1, -1))
         row = clay.onto(np.concatenate([upper, slit[k:] + d * along[k:], lower[::-1]]))
         row[[0, -1], 0] = 0.0
         rows.append(row)
-    taper = np.sqrt(1 - (np.arange(k) / k)**2)[:, None]
+    taper = np.sqrt(1 - (np.arange(k) / k) ** 2)[:, None]
     half = gap / 2 * np.array([0.0, 1.0, 0.0]) * taper
     return [*rows, np.concatenate([slit[:k] + half, slit[k:], (slit[:k] - half)[::-1]])]
 
 
-def gum_and_teeth(part: str, arch: NDArray, down: ArrayLike, gum: float, teeth: Sequence[tuple[float, float, float, float]],
-                  *, lean: float = 0.0) -> Sheet:
+def gum_and_teeth(
+    part: str,
+    arch: NDArray,
+    down: ArrayLike,
+    gum: float,
+    teeth: Sequence[tuple[float, float, float, float]],
+    *,
+    lean: float = 0.0,
+) -> Sheet:
     """Return a row of teeth on a gum that runs along an arch (k, 3), symmetrical: from the left end to the right one.
 
     down: direction in which the teeth grow. gum: thickness. teeth: (place along the arch 0..1, width, depth, length)
@@ -58,32 +65,43 @@ def gum_and_teeth(part: str, arch: NDArray, down: ArrayLike, gum: float, teeth: 
     if (out[:, 2].sum()) < 0:
         out = -out
     t = 2 * np.pi * np.arange(6) / 6
-    thick = gum * np.sqrt(np.maximum(1 - np.linspace(-1, 1, len(path))**6, 0.1))
-    rings = [p + g * (np.cos(t)[:, None] * o + 1.1 * np.sin(t)[:, None] * down)
-             for p, o, g in zip(path, out, thick, strict=True)]
+    thick = gum * np.sqrt(np.maximum(1 - np.linspace(-1, 1, len(path)) ** 6, 0.1))
+    rings = [
+        p + g * (np.cos(t)[:, None] * o + 1.1 * np.sin(t)[:, None] * down)
+        for p, o, g in zip(path, out, thick, strict=True)
+    ]
     numbers = sheet.tube(rings, "gums")
     sheet.cap(numbers[0], "gums")
     sheet.cap(numbers[-1], "gums")
     for where, width, depth, length in teeth:
         i = where * (len(path) - 1)
-        p, a, o = (np.array([np.interp(i, range(len(path)), values[:, c]) for c in range(3)])
-                   for values in (path, along, out))
+        p, a, o = (
+            np.array([np.interp(i, range(len(path)), values[:, c]) for c in range(3)]) for values in (path, along, out)
+        )
         tooth(sheet, p + 0.5 * gum * down, a, o, down + lean * o, width, depth, length)
     return sheet
 
 
-def tooth(sheet: Sheet, root: NDArray, along: NDArray, out: NDArray, down: NDArray, width: float, depth: float,
-          length: float) -> None:
+def tooth(
+    sheet: Sheet, root: NDArray, along: NDArray, out: NDArray, down: NDArray, width: float, depth: float, length: float
+) -> None:
     """Add a tooth: its rings of six shrink towards a blunt tip; one much longer than wide curves back like a fang."""
     t = 2 * np.pi * (np.arange(6) + 0.5) / 6
     fang = length > 1.8 * width
-    shape = ((0.0, 1.0), (0.35, 0.92), (0.7, 0.55), (0.93, 0.2)) if fang else \
-        ((0.0, 0.85), (0.4, 1.0), (0.85, 0.95), (1.0, 0.7))
+    shape = (
+        ((0.0, 1.0), (0.35, 0.92), (0.7, 0.55), (0.93, 0.2))
+        if fang
+        else ((0.0, 0.85), (0.4, 1.0), (0.85, 0.95), (1.0, 0.7))
+    )
     rings = []
     for height, size in shape:
         bend = -0.18 * length * height**2 * out if fang else 0.0
-        rings.append(root + height * length * down + bend + size / 2 * (
-            width * np.cos(t)[:, None] * along + depth * np.sin(t)[:, None] * out))
+        rings.append(
+            root
+            + height * length * down
+            + bend
+            + size / 2 * (width * np.cos(t)[:, None] * along + depth * np.sin(t)[:, None] * out)
+        )
     numbers = sheet.tube(rings, "teeth")
     sheet.cap(numbers[0], "teeth")
     sheet.cap(numbers[-1], "teeth", rings[-1].mean(axis=0) + 0.05 * length * down)
@@ -100,7 +118,7 @@ def tongue(part: str, spine: ArrayLike, widths: ArrayLike, thicknesses: ArrayLik
     for p, a, w, h in zip(path, along, widths, thicknesses, strict=True):
         up = np.cross(a, [1.0, 0.0, 0.0])
         up *= np.sign(up[1])
-        dip = 1 - groove * np.clip(np.sin(t), 0, 1)**4 * 2
+        dip = 1 - groove * np.clip(np.sin(t), 0, 1) ** 4 * 2
         rings.append(p + w * np.cos(t)[:, None] * np.array([1.0, 0, 0]) + (h * np.sin(t) * dip)[:, None] * up)
     numbers = sheet.tube(rings, "tongue")
     sheet.cap(numbers[0], "tongue")

@@ -14,8 +14,16 @@ from facegen.geometry.mesh import Mesh
 SOURCE = "own work of the facegen authors, MIT"
 
 
-def save_avatar(folder: Path, name: str, mesh: Mesh, colours: Mapping[str, tuple[int, int, int]],
-                landmarks: Mapping[str, str], *, about: str, decimals: int) -> None:
+def save_avatar(
+    folder: Path,
+    name: str,
+    mesh: Mesh,
+    colours: Mapping[str, tuple[int, int, int]],
+    landmarks: Mapping[str, str],
+    *,
+    about: str,
+    decimals: int,
+) -> None:
     """Write ``name.obj``, ``name.mtl`` and ``landmarks.yaml``. colours: sRGB 0..255 of every material."""
     text = format_obj(mesh, comment=f"facegen: {about}\nSource: {SOURCE}, made by author.py.", decimals=decimals)
     head, _, rest = text.partition("\nv ")
@@ -26,8 +34,13 @@ def save_avatar(folder: Path, name: str, mesh: Mesh, colours: Mapping[str, tuple
         kd = " ".join(f"{c / 255:.4f}" for c in colours[material])
         lines += [f"newmtl {material}", f"Kd {kd}", f"Ks {shine} {shine} {shine}", "Ns 40", ""]
     (folder / f"{name}.mtl").write_text("\n".join(lines), encoding="utf-8")
-    lines = [f"# Landmarks of {name}.obj: a number is a vertex (0-based), three numbers a place, snapped to the surface.",
-             "# Left and right are the animal's own.", f"source: {SOURCE}", f"mesh: {name}.obj", "landmarks:"]
+    lines = [
+        f"# Landmarks of {name}.obj: a number is a vertex (0-based), three numbers a place, snapped to the surface.",
+        "# Left and right are the animal's own.",
+        f"source: {SOURCE}",
+        f"mesh: {name}.obj",
+        "landmarks:",
+    ]
     lines += [f"  {mark}: {where}" for mark, where in landmarks.items()]
     (folder / "landmarks.yaml").write_text("\n".join(lines) + "\n", encoding="utf-8")
 
@@ -35,8 +48,8 @@ def save_avatar(folder: Path, name: str, mesh: Mesh, colours: Mapping[str, tuple
 def both_sides(mesh: Mesh, left: Mapping[str, NDArray | str], decimals: int) -> dict[str, str]:
     """Return landmark entries for both sides from those of the left half, before the head is bent out of symmetry.
 
-    left: name (``_L`` or of the middle) -> place (3,), which becomes the vertex there, or else a point. Those that end in
-    ``eye_center_L`` lie on the eyeball.
+    left: name (``_L`` or of the middle) -> place (3,), which becomes the vertex there. ``eye_center_L`` lies
+    on the eyeball.
     """
     out = {}
     for name, place in left.items():

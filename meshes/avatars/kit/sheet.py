@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Sequence
+from itertools import pairwise
 
 import numpy as np
 from clay import mirrored
@@ -49,14 +50,15 @@ class Sheet:
             j = (i + 1) % len(first)
             a, b, c, d = (int(x) for x in (first[i], first[j], second[j], second[i]))
             short = np.linalg.norm(self.vertices[a] - self.vertices[c]) <= np.linalg.norm(
-                self.vertices[b] - self.vertices[d])
+                self.vertices[b] - self.vertices[d]
+            )
             cut = [(a, b, c), (a, c, d)] if short else [(a, b, d), (b, c, d)]
             self.triangles([t for t in cut if len(set(t)) == 3], material if isinstance(material, str) else material[i])
 
     def tube(self, rows: Sequence[NDArray], material: str, *, closed: bool = True) -> list[NDArray]:
         """Add rows of points (each (k, 3)) and the bands between them; return the rows' numbers."""
         numbers = [self.row(r) for r in rows]
-        for a, b in zip(numbers[:-1], numbers[1:], strict=True):
+        for a, b in pairwise(numbers):
             self.band(a, b, material, closed=closed)
         return numbers
 
@@ -81,8 +83,14 @@ class Sheet:
             faces = orient(faces, vertices)
         materials = tuple(dict.fromkeys(names))
         order = np.argsort([materials.index(n) for n in names], kind="stable")
-        return Mesh(vertices, faces[order], materials, np.array([materials.index(names[i]) for i in order]),
-                    (self.part,), np.zeros(len(faces), int))
+        return Mesh(
+            vertices,
+            faces[order],
+            materials,
+            np.array([materials.index(names[i]) for i in order]),
+            (self.part,),
+            np.zeros(len(faces), int),
+        )
 
 
 def orient(faces: NDArray, vertices: NDArray) -> NDArray:

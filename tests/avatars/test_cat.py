@@ -1,0 +1,68 @@
+"""The cat that ships: its files are what its script writes, its lids and its mouth can close and open."""
+
+import subprocess
+import sys
+from collections import Counter
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from facegen.face.landmarks import REQUIRED
+from facegen.fileio.obj import load_obj
+from facegen.transfer.landmarks import check_places, load_landmarks
+
+HERE = Path(__file__).parents[2] / "meshes" / "avatars" / "cat"
+
+
+@pytest.fixture(scope="module")
+def mesh():
+    return load_obj(HERE / "cat.obj")
+
+
+@pytest.fixture(scope="module")
+def points(mesh):
+    marks = load_landmarks(HERE / "landmarks.yaml", mesh, mesh_name="cat.obj")
+    assert set(REQUIRED) <= set(marks.names)
+    assert check_places(marks, mesh) == []
+    return marks.points(mesh.vertices)
+
+
+def part(mesh, name):
+    return mesh.faces[mesh.face_parts == mesh.parts.index(name)]
+
+
+def test_the_script_writes_what_ships(tmp_path):
+    subprocess.run([sys.executable, HERE / "author.py", tmp_path], check=True)
+    assert (tmp_path / "cat.mtl").read_text() == (HERE / "cat.mtl").read_text()
+    new, old = ((folder / "cat.obj").read_text().splitlines() for folder in (tmp_path, HERE))
+    assert [line for line in new if line[:2] != "v "] == [line for line in old if line[:2] != "v "]
+    # Another machine's arithmetic may round the last decimal otherwise.
+    places = [np.loadtxt([line[2:] for line in lines if line[:2] == "v "]) for lines in (new, old)]
+    np.testing.assert_allclose(*places, atol=2e-3)
+
+
+def test_no_side_of_the_skin_has_more_than_two_triangles(mesh):
+    skin = part(mesh, "skin")
+    count = Counter((int(a), int(b)) for face in skin for a, b in zip(face, np.roll(face, -1), strict=True))
+    assert max(count.values()) == 1, "two triangles run along a side in one direction"
+    corners = mesh.vertices[skin]
+    areas = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1) / 2
+    assert areas.min() > 0
+
+
+@pytest.mark.parametrize("side", ["L", "R"])
+def test_the_lid_margin_lies_close_before_the_eyeball(mesh, points, side):
+    ball = mesh.vertices[np.unique(part(mesh, f"eye_{side}"))]
+    centre = (ball.min(axis=0) + ball.max(axis=0)) / 2
+    radius = np.linalg.norm(points[f"eye_center_{side}"] - centre)
+    margin = np.array([points[f"eye_{name}_{side}"] for name in ("inner", "outer", "upper", "lower")])
+    gaps = np.linalg.norm(margin - centre, axis=1) / radius
+    assert gaps.min() > 0.9
+    assert gaps.max() < 1.3
+
+
+def test_the_sides_mirror_each_other(points):
+    for name in REQUIRED:
+        if name.endswith("_L"):
+            np.testing.assert_allclose(points[name] * (-1, 1, 1), points[f"{name[:-1]}R"], atol=1e-3, err_msg=name)
