@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw
 
-from facegen import Wireframe, load_face, render, render_passes, save_image, save_passes
+from facegen import Wireframe, load_face, render, render_passes, rig, save_image, save_passes
 from facegen.cli import main
 
 IMAGES = Path(__file__).parent / "images"
@@ -45,6 +45,18 @@ def pass_strip() -> NDArray[np.uint8]:
     return strip([*shown, np.asarray(picture)])
 
 
+def avatars() -> NDArray[np.uint8]:
+    """Return the shipped avatars in rows: neutral and four poses."""
+    rows = []
+    with tempfile.TemporaryDirectory() as folder:
+        for name in ("human", "cartoon", "cat"):
+            path = rig(name, f"{folder}/{name}.glb", sets=["units", "expressions"]).path
+            face = load_face(path)
+            rows.append(strip([render(face, pose, size=SIZE, view=(20, 0))
+                               for pose in ("neutral", "happiness", "surprise", "anger", "43E")]))
+    return np.concatenate(rows, axis=0)
+
+
 if __name__ == "__main__":
     IMAGES.mkdir(exist_ok=True)
     run("gallery", "-o", IMAGES)
@@ -56,6 +68,7 @@ if __name__ == "__main__":
     save_image(strip([render(FACE, "anger", size=SIZE, view=(35, 0), shadows=shadows) for shadows in (False, True)]),
                IMAGES / "shadows.webp")
     save_image(pass_strip(), IMAGES / "passes.webp")
+    save_image(avatars(), IMAGES / "avatars.webp")
     with tempfile.TemporaryDirectory() as folder:
         run("figures", "-o", folder, "--size", 256)
         for face in ("akimoto-1986", "akimoto"):
