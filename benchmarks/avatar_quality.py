@@ -18,7 +18,7 @@ from scipy.spatial import cKDTree
 from facegen.face.face import load_face
 from facegen.fileio.avatar import load_avatar
 from facegen.render import render_passes
-from facegen.transfer.margins import LIDS, LIPS, Slit, find_margins
+from facegen.transfer.margins import LIDS, LIPS, Slit, facing_margins
 from facegen.transfer.rig import avatar_names, rig
 from facegen.transfer.skin import METHODS, Skin
 
@@ -30,11 +30,7 @@ BESIDE, ABOVE, BEHIND = 12.0, 15.0, -40.0
 
 def gaps(skin: Skin, slit: Slit, moved: NDArray | float) -> NDArray:
     """Return the distances, mm, of facing places of a slit's edges."""
-    template = skin.template
-    guide = find_margins(template.surface, slit, template.places, skin.correspondence.sides).line
-    edges = find_margins(skin.surface, slit, skin.places, skin.sides, shape=skin.registered, guide=guide)
-    places = skin.surface.vertices + moved
-    return np.linalg.norm(edges.upper @ places - edges.lower @ places, axis=1)
+    return np.linalg.norm(facing_margins(skin, slit)[1].gap(skin.surface.vertices + moved), axis=1)
 
 
 def eye_seen(path: Path) -> float:

@@ -11,6 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from facegen.geometry.fade import smooth_step
+
 Array = NDArray[np.float64]
 
 
@@ -42,8 +44,7 @@ def fold_field(fold: Fold, vertices: Array, normals: Array) -> Array:
     rows = np.arange(len(vertices))
     distance, away = distance[rows, nearest], away[rows, nearest]
     place = (run[nearest] + t[rows, nearest] * length[nearest]) / run[-1]
-    fade = np.clip(np.minimum(place, 1.0 - place) / 0.3, 0.0, 1.0)
-    fade = fade * fade * (3.0 - 2.0 * fade)
+    fade = smooth_step(np.minimum(place, 1.0 - place) / 0.3)
     side = np.where(away @ fold.toward < 0, -distance, distance)
     u = side / fold.width
     height = -fold.depth * np.exp(-u * u) + fold.ridge * np.exp(-((u - 2.0) ** 2) / 1.4)

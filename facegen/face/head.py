@@ -5,14 +5,15 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from facegen.geometry.fade import smooth_step
+
 Array = NDArray[np.float64]
 
 
 def neck_weight(vertices: Array, moves_above: Array, rests_below: Array) -> Array:
     """Return how much of the head's turn each vertex makes, (n, 1): 1 above the one place, 0 below the other."""
     way = moves_above - rests_below
-    t = np.clip((vertices - rests_below) @ way / (way @ way), 0.0, 1.0)
-    return (t * t * (3.0 - 2.0 * t))[:, None]
+    return smooth_step((vertices - rests_below) @ way / (way @ way))[:, None]
 
 
 def turn_head(vertices: Array, head: Array, pivot: Array, weight: Array) -> Array:

@@ -19,6 +19,7 @@ from facegen.face.landmarks import Landmark, read_landmarks
 from facegen.facs.validate import Entry
 from facegen.facs.yamlfile import read_data
 from facegen.fileio.obj import load_obj
+from facegen.geometry.fade import smooth_step
 from facegen.geometry.mesh import Mesh
 from facegen.geometry.subdivision import Subdivision, loop_levels
 
@@ -240,8 +241,7 @@ def _part(entry: Entry, folder: Path, load: Callable[[Path], Mesh], cage: Mesh, 
     points: tuple = ()
     if name in with_parts:      # a feature point of this part: its pull fades backward from it
         row = with_parts[name]
-        t = np.clip((mesh.vertices[:, 2] - (places[row, 2] - 55.0)) / 50.0, 0.0, 1.0)
-        points = ((row, (t * t * (3 - 2 * t))[:, None]),)
+        points = ((row, smooth_step((mesh.vertices[:, 2] - (places[row, 2] - 55.0)) / 50.0)[:, None]),)
     if carrier == "skull":
         return Attachment(mesh, points=points)
     if carrier == "jaw":
@@ -252,8 +252,7 @@ def _part(entry: Entry, folder: Path, load: Callable[[Path], Mesh], cage: Mesh, 
         top, bottom = (e.number() for e in _some(fields["fades"], 2, "two heights [top, bottom]"))
         if top <= bottom:
             raise fields["fades"].wrong("two heights [top, bottom], the top first")
-        t = np.clip((top - mesh.vertices[:, 1]) / (top - bottom), 0.0, 1.0)
-        return Attachment(mesh, jaw=(t * t * (3 - 2 * t))[:, None])
+        return Attachment(mesh, jaw=smooth_step((top - mesh.vertices[:, 1]) / (top - bottom))[:, None])
     if carrier == "eye":
         if "eye" not in fields:
             raise entry.fail("a part carried by an eye needs eye: L or R")

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from facegen.geometry.camera import Camera
+from facegen.geometry.fade import smooth_step
 from facegen.geometry.mesh import Mesh
 from facegen.geometry.normals import vertex_normals
 from facegen.render.occlusion import frame_round
@@ -62,8 +63,7 @@ def shadow(mesh: Mesh, towards: ArrayLike) -> NDArray[np.float32]:
 
     normal = vertex_normals(mesh.vertices, mesh.faces) @ axes.T
     facing = normal[:, 2].copy()
-    turned = np.clip((_FACING - facing) / (_FACING - _AWAY), 0, 1)
-    turned = turned * turned * (3 - 2 * turned)
+    turned = smooth_step((_FACING - facing) / (_FACING - _AWAY))
     normal[:, 2] = np.maximum(facing, _HELD)
     normal /= np.sqrt((normal * normal).sum(axis=1, keepdims=True))
     rows = np.intersect1d(np.flatnonzero(turned < 1), used)

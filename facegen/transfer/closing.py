@@ -10,25 +10,19 @@ touch where the template's have not parted.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import sparse
-from scipy.spatial import cKDTree
 
-from facegen.geometry.factor import Factor
-from facegen.geometry.operators import Surface, dirichlet, hinge_energy
-from facegen.transfer.eyeball import Eyeball
-from facegen.transfer.margins import LIPS, SAMPLES, Margins, Slit, find_margins
+from facegen.geometry.fade import smooth_step
+from facegen.transfer.closing_field import Field, closing_field
+from facegen.transfer.eyeball import EyeFront
+from facegen.transfer.margins import LIPS, SAMPLES, Margins, Slit, facing_margins
 from facegen.transfer.skin import Skin
 
 Array = NDArray[np.float64]
 
-# The field ends at this share of the slit's width from its edges, on the template: below the brow, beside the nose.
-_REACH = 0.5
-# A field's stretching against its bending, 1/mm^2: enough to keep it from swinging past 0 and 1.
-_STRETCH = 0.004
-_HOLD = 1e4
 # Places whose gap on the template is below this, mm, are corners: they close as their neighbours do.
 _CORNER = 0.15
 # What the template closes counts in full from this share of the gap on.
@@ -45,8 +39,6 @@ _ON_THE_BALL = 1.25
 _LIFTED, _OUT = 0.15, 0.02
 # The middle of a triangle with sides s lies nearer to the eye than its corners: sqrt(1 - s^2 / 3), at most so much.
 _MOST_SAG = 0.3
-# What stands out of an eye, a cornea or a glint, counts so many radii around: lids of few vertices span it.
-_AROUND = 0.3
 _TINY = 1e-300
 
 
@@ -61,142 +53,110 @@ class _Wanted:
     shut: NDArray[np.bool_]
 
 
-class _Front:
-    """How far from its centre an eye reaches in a direction, in radii."""
-
-    def __init__(self, ball: Eyeball, eye: Array) -> None:
-        away = (eye - ball.centre) @ np.linalg.inv(ball.shape)
-        radius = np.linalg.norm(away, axis=1)
-        self._tree = cKDTree(away / np.maximum(radius, _TINY)[:, None])
-        around = self._tree.query_ball_point(self._tree.data, _AROUND)
-        self._radius = np.array([radius[some].max() for some in around])
-
-    def __call__(self, away: Array) -> Array:
-        """Return the radius (n,) in the directions (n, 3)."""
-        unit = away / np.maximum(np.linalg.norm(away, axis=1), _TINY)[:, None]
-        return self._radius[self._tree.query(unit)[1]]
-
-
 @dataclass(frozen=True, eq=False)
 class Closing:
-    """How one slit of an avatar is closed; ``margins`` are the avatar's. Built once; for any shapes."""
+    """How one slit of an avatar is closed: built once, for the template's k shapes. ``margins`` and ``field`` are the
+    avatar's, ``rest`` (n, 3) its skin, ``eye`` what its lids lie on."""
 
     margins: Margins
-    rows: NDArray[np.int64]         # the vertices that take part
-    field_upper: Array
-    field_lower: Array
-    edges: NDArray[np.int64]        # (e, 2), among those rows
-    along: sparse.csr_array         # (rows, SAMPLES)
-    rest: Array                     # (n, 3)
-    ball: Eyeball | None
-    front: _Front | None            # what the lids lie on
+    field: Field
+    rest: Array
+    eye: EyeFront | None
     wanted: _Wanted
 
     def close(self, motion: Array) -> None:
         """Add to the displacements (k, n, 3) of the skin what they miss, in place."""
         wanted = self.wanted
         for k in np.flatnonzero(wanted.active.max(axis=1) > 0):
-            missing = wanted.active[k, :, None] * (wanted.gap[k] - self._gap(motion[k]))
+            missing = wanted.active[k, :, None] * (wanted.gap[k] - self.margins.gap(self.rest + motion[k]))
             missing = missing * _beyond(missing)[:, None]
             share = wanted.upper_share[k]
-            self._add(motion[k], share * missing, (share - 1.0) * missing)
+            self._move(motion[k], self.field.steps(share * missing, (share - 1.0) * missing))
 
     def seal(self, motion: Array) -> None:
         """Bring edges that are shut onto one line, no nearer to the eye than either, in place."""
         shut = self.wanted.shut
         for k in np.flatnonzero(shut.any(axis=1)):
-            upper = self.margins.upper @ (self.rest + motion[k])
-            lower = self.margins.lower @ (self.rest + motion[k])
+            upper, lower = self.margins.ends(self.rest + motion[k])
             line = (upper + lower) / 2
-            if self.ball is not None:
-                away = line - self.ball.centre
-                farther = np.maximum(*(np.linalg.norm(edge - self.ball.centre, axis=1) for edge in (upper, lower)))
-                line = self.ball.centre + away * (farther / np.maximum(np.linalg.norm(away, axis=1), _TINY))[:, None]
+            if self.eye is not None:
+                centre = self.eye.ball.centre
+                farther = np.maximum(*(np.linalg.norm(edge - centre, axis=1) for edge in (upper, lower)))
+                line = centre + farther[:, None] * _unit(line - centre)
             on = (shut[k] * _beyond(upper - lower - self.wanted.gap[k]))[:, None]
-            self._add(motion[k], on * (line - upper), on * (line - lower), arc=False)
+            motion[k, self.field.rows] += self.field.steps(on * (line - upper), on * (line - lower))
 
-    def _gap(self, moved: Array) -> Array:
-        places = self.rest + moved
-        return self.margins.upper @ places - self.margins.lower @ places
+    @cached_property
+    def _at_rest(self) -> Array:
+        """The field's vertices (r, 3) in radii of the eye."""
+        return self.eye.ball.in_radii(self.rest[self.field.rows])
 
-    def _add(self, moved: Array, upper: Array, lower: Array, *, arc: bool = True) -> None:
-        """Move the edges by (SAMPLES, 3) and the skin round them along, in place; on an arc round the ball."""
-        step = self.field_upper[:, None] * (self.along @ upper) + self.field_lower[:, None] * (self.along @ lower)
-        if self.ball is None or self.front is None or not arc:
-            moved[self.rows] += step
+    def _move(self, moved: Array, step: Array) -> None:
+        """Move the skin of the field by (r, 3), in place: on an arc round the ball, and over what it covers."""
+        rows = self.field.rows
+        if self.eye is None:
+            moved[rows] += step
             return
-        inverse = np.linalg.inv(self.ball.shape)
-        rest = self.rest[self.rows]
-        now = (rest + moved[self.rows] - self.ball.centre) @ inverse
+        ball = self.eye.ball
+        now = ball.in_radii(self.rest[rows] + moved[rows])
+        then = now + step @ ball.inverse
+        home = np.linalg.norm(self._at_rest, axis=1)
+        lift = np.clip(np.linalg.norm(then - self._at_rest, axis=1) / _LIFTED, 0.0, 1.0)
+        wanted = np.where(home < _ON_THE_BALL, np.maximum(home, self._over(_unit(then))), 0.0)
         radius = np.linalg.norm(now, axis=1)
-        at_rest = (rest - self.ball.centre) @ inverse
-        home = np.linalg.norm(at_rest, axis=1)
-        step = step @ inverse
-        then = now + step
-        lift = np.clip(np.linalg.norm(then - at_rest, axis=1) / _LIFTED, 0.0, 1.0)
-        wanted = np.where(home < _ON_THE_BALL, np.maximum(home, self._over(then)), 0.0)
         radius = radius + lift * np.maximum(wanted - radius, 0.0)
-        length = np.linalg.norm(then, axis=1)
-        changed = (step != 0).any(axis=1) & (length > _TINY)
-        then = then * np.where(changed, radius / np.maximum(length, _TINY), 1.0)[:, None]
-        moved[self.rows] = np.where(changed[:, None], then @ self.ball.shape + self.ball.centre - rest,
-                                    moved[self.rows])
+        changed = (step != 0).any(axis=1) & (then != 0).any(axis=1)
+        place = (radius[:, None] * _unit(then)) @ ball.shape + ball.centre
+        moved[rows] = np.where(changed[:, None], place - self.rest[rows], moved[rows])
+
+    def _over(self, unit: Array) -> Array:
+        """Return the radius (r,) at which triangles with corners in the directions (r, 3) clear the eye."""
+        edges = self.field.edges
+        side = ((unit[edges[:, 0]] - unit[edges[:, 1]]) ** 2).sum(axis=1)
+        longest = np.zeros(len(unit))
+        np.maximum.at(longest, edges.ravel(), np.repeat(side, 2))
+        return (self.eye(unit) + _OUT) / np.sqrt(1 - np.minimum(longest / 3, _MOST_SAG))
 
 
-    def _over(self, places: Array) -> Array:
-        """Return the radius (rows,) at which triangles with corners in these directions clear the eye."""
-        unit = places / np.maximum(np.linalg.norm(places, axis=1), _TINY)[:, None]
-        side = ((unit[self.edges[:, 0]] - unit[self.edges[:, 1]]) ** 2).sum(axis=1)
-        longest = np.zeros(len(places))
-        np.maximum.at(longest, self.edges.ravel(), np.repeat(side, 2))
-        return (self.front(places) + _OUT) / np.sqrt(1 - np.minimum(longest / 3, _MOST_SAG))
-
-
-def closing(skin: Skin, slit: Slit, ball: Eyeball | None = None, eye: Array | None = None) -> Closing | None:
+def closing(skin: Skin, slit: Slit, eye: EyeFront | None = None) -> Closing | None:
     """Return how a slit of the avatar closes in the template's shapes; None where it, or the template, has no slit.
 
-    ball, eye (e, 3): how the eye behind lids turns, and its vertices, if there is one.
+    eye: what lies behind lids, if anything does.
     """
-    template = skin.template
-    own = find_margins(template.surface, slit, template.places, skin.correspondence.sides)
-    if own is None:
+    found = facing_margins(skin, slit)
+    if found is None:
         return None
-    margins = find_margins(skin.surface, slit, skin.places, skin.sides, shape=skin.registered, guide=own.line)
-    if margins is None:
-        return None
-    part = skin.parts.matrices[slit.name]
-    wanted = _wanted(template.surface.vertices, template.motion, own, skin.surface.vertices, margins, part,
-                     lips=slit is LIPS)
-    width = float(np.linalg.norm(own.line[0, -1] - own.line[0, 0]))
-    front = _Front(ball, eye) if ball is not None and eye is not None else None
-    rows, upper, lower, edges, along = _fields(skin, margins, own, _REACH * width)
-    return Closing(margins, rows, upper, lower, edges, along, skin.surface.vertices, ball, front, wanted)
+    own, margins = found
+    template, rest = skin.template, skin.surface.vertices
+    told = _told_lips if slit is LIPS else _told_lids
+    upper, lower = (np.stack([edge @ one for one in template.motion]) for edge in (own.upper, own.lower))
+    wanted = told(own.gap(template.surface.vertices), upper, lower, margins.gap(rest), skin.parts.matrices[slit.name])
+    return Closing(margins, closing_field(skin, own, margins), rest, eye, wanted)
 
 
-def _wanted(rest: Array, motion: Array, own: Margins, avatar: Array, margins: Margins, part: Array, *,
-            lips: bool) -> _Wanted:
-    """Return what the template's displacements (k, n_s, 3) ask of the avatar. rest, avatar: neutral vertices."""
-    k = len(motion)
-    upper = np.stack([own.upper @ one for one in motion]) if k else np.zeros((0, SAMPLES, 3))
-    lower = np.stack([own.lower @ one for one in motion]) if k else np.zeros((0, SAMPLES, 3))
-    gap = own.upper @ rest - own.lower @ rest
+def _told_lips(gap: Array, upper: Array, lower: Array, own_gap: Array, part: Array) -> _Wanted:
+    """Return what the template's lips tell the avatar's: see `_told_lids`."""
+    change = upper - lower
+    parted = np.linalg.norm(change, axis=2) / _PARTED
+    return _Wanted(own_gap + change @ part.T, smooth_step(1.0 - parted), np.full(len(change), 0.5),
+                   np.zeros(parted.shape, bool))
+
+
+def _told_lids(gap: Array, upper: Array, lower: Array, own_gap: Array, part: Array) -> _Wanted:
+    """Return what the template's lids tell the avatar's. gap, own_gap (SAMPLES, 3): the template's and the avatar's at
+    rest; upper, lower (k, SAMPLES, 3): how the template's edges move; part (3, 3): how movements go on the avatar."""
     length = np.linalg.norm(gap, axis=1)
-    toward = gap / np.maximum(length, _TINY)[:, None]
+    toward = _unit(gap)
     moved = gap + upper - lower
-    own_gap = margins.upper @ avatar - margins.lower @ avatar
-    if lips:
-        parted = np.linalg.norm(moved - gap, axis=2) / _PARTED
-        return _Wanted(own_gap + (moved - gap) @ part.T, _smooth_step(1.0 - parted), np.full(k, 0.5),
-                       np.zeros((k, SAMPLES), bool))
     ratio = np.maximum((moved * toward).sum(axis=2) / np.maximum(length, _TINY), 0.0)
     open_at = np.flatnonzero(length > _CORNER)
     if not len(open_at):
-        return _Wanted(np.broadcast_to(own_gap, moved.shape), np.zeros(moved.shape[:2]), np.full(k, 0.5),
-                       np.zeros(moved.shape[:2], bool))
+        none = np.zeros(ratio.shape)
+        return _Wanted(np.broadcast_to(own_gap, moved.shape), none, np.full(len(moved), 0.5), none > 0)
     ratio = ratio[:, open_at[np.abs(np.arange(SAMPLES)[:, None] - open_at).argmin(axis=1)]]
     across = moved - ratio[:, :, None] * gap
     target = ratio[:, :, None] * own_gap + across @ part.T
-    active = _smooth_step((1.0 - ratio) / _LEAST_CLOSING)
+    active = smooth_step((1.0 - ratio) / _LEAST_CLOSING)
     shut = (ratio <= _SHUT) & (np.linalg.norm(target, axis=2) <= _SHUT_MM) & (active > 0)
     down = np.maximum(-(upper * toward).sum(axis=2), 0.0).sum(axis=1)
     up = np.maximum((lower * toward).sum(axis=2), 0.0).sum(axis=1)
@@ -210,47 +170,6 @@ def _beyond(missing: Array) -> Array:
     return square / (square + _TOLERATED**2)
 
 
-def _smooth_step(t: Array) -> Array:
-    t = np.clip(t, 0.0, 1.0)
-    return t * t * (3 - 2 * t)
-
-
-def _fields(skin: Skin, margins: Margins, own: Margins, reach: float):
-    """Return the vertices near the slit, how much they go with its upper and with its lower edge, the mesh's edges
-    (e, 2) among them, and the weights (rows, SAMPLES) that tell their place along it."""
-    tree = cKDTree(own.line.reshape(-1, 3))
-    distance, _ = tree.query(skin.registered)
-    near = distance < reach
-    near[margins.rows] = True
-    faces = skin.surface.faces[near[skin.surface.faces].any(axis=1)]
-    rows, local = np.unique(faces, return_inverse=True)
-    surface = Surface(skin.surface.vertices[rows], local.reshape(-1, 3).astype(np.int32))
-    edges = np.searchsorted(rows, margins.rows)
-    held = np.zeros(len(rows))
-    held[~near[rows]] = _HOLD
-    held[edges] = _HOLD
-    held[np.isin(rows, margins.corners)] = _HOLD
-    wanted = np.zeros((len(rows), 2))
-    wanted[edges, 0], wanted[edges, 1] = margins.is_upper, ~margins.is_upper
-    matrix = hinge_energy(surface) + _STRETCH * dirichlet(surface)
-    scale = matrix.diagonal().max()
-    solved = Factor(matrix + sparse.diags_array(scale * (held + 1e-12)), what="the lids' field").solve(
-        scale * held[:, None] * wanted)
-    upper, lower = np.clip(solved, 0.0, 1.0).T
-    upper[edges], lower[edges] = wanted[edges].T
-    at = _where(skin, margins, rows, edges)
-    left = np.clip(np.floor(at * (SAMPLES - 1)).astype(int), 0, SAMPLES - 2)
-    share = at * (SAMPLES - 1) - left
-    index = np.repeat(np.arange(len(rows)), 2)
-    along = sparse.csr_array((np.stack([1 - share, share], axis=1).ravel(),
-                              (index, np.stack([left, left + 1], axis=1).ravel())), shape=(len(rows), SAMPLES))
-    return rows, upper, lower, surface.edges[0], along
-
-
-def _where(skin: Skin, margins: Margins, rows: NDArray, edges: NDArray) -> Array:
-    """Return where along the slit the vertices lie, 0 to 1: at its nearest place, on the registered skin."""
-    upper, lower = margins.upper @ skin.registered, margins.lower @ skin.registered
-    _, nearest = cKDTree(np.concatenate([upper, lower])).query(skin.registered[rows])
-    at = (nearest % SAMPLES) / (SAMPLES - 1)
-    at[edges] = margins.at
-    return at
+def _unit(ways: Array) -> Array:
+    """Return the directions (n, 3) of ways (n, 3); zero of none."""
+    return ways / np.maximum(np.linalg.norm(ways, axis=1), _TINY)[:, None]

@@ -9,9 +9,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial import cKDTree
 
 Array = NDArray[np.float64]
 
@@ -29,6 +31,9 @@ _BEHIND = 0.57
 # Eyes that look aside by less than this, degrees, turn about the head's axes, as a person's do; an animal's, about
 # their own.
 _ASIDE = 30.0
+# What stands out of an eye, a cornea or a glint, counts so many radii around: lids of few vertices span it.
+_AROUND = 0.3
+_TINY = 1e-300
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,6 +53,15 @@ class Eyeball:
         """The mean half axis, mm."""
         return float(np.cbrt(np.linalg.det(self.shape)))
 
+    @cached_property
+    def inverse(self) -> Array:
+        """(3, 3): takes the eye to the unit ball."""
+        return np.linalg.inv(self.shape)
+
+    def in_radii(self, at: Array) -> Array:
+        """Return places (n, 3) as seen from the centre, where the eye is the unit ball."""
+        return (at - self.centre) @ self.inverse
+
     def turned(self, yaw: Array, pitch: Array, at: Array) -> Array:
         """Return displacements (k, n, 3) of places (n, 3) for angles (k,) in degrees: to the subject's left, and up."""
         turn = gaze_rotation(yaw, pitch, self.azimuth)
@@ -57,8 +71,25 @@ class Eyeball:
             length = np.linalg.norm(way, axis=1, keepdims=True)
             way = way * (np.minimum(length, self.slide) / np.maximum(length, 1e-300))
             return np.repeat(way[:, None, :], len(at), axis=1)
-        moves = self.shape @ (turn - np.eye(3)) @ np.linalg.inv(self.shape)
+        moves = self.shape @ (turn - np.eye(3)) @ self.inverse
         return (at - self.centre) @ np.swapaxes(moves, 1, 2)
+
+
+class EyeFront:
+    """How far an eye reaches from its centre, cornea, glint and all, in radii of its ``ball``."""
+
+    def __init__(self, ball: Eyeball, vertices: Array) -> None:
+        """vertices (e, 3): the eye's, mm."""
+        self.ball = ball
+        away = ball.in_radii(vertices)
+        radius = np.linalg.norm(away, axis=1)
+        self._tree = cKDTree(away / np.maximum(radius, _TINY)[:, None])
+        around = self._tree.query_ball_point(self._tree.data, _AROUND)
+        self._radius = np.array([radius[some].max() for some in around])
+
+    def __call__(self, unit: Array) -> Array:
+        """Return the radius (n,) in the directions (n, 3), unit vectors of `Eyeball.in_radii`."""
+        return self._radius[self._tree.query(unit)[1]]
 
 
 def gaze_rotation(yaw: Array, pitch: Array, azimuth: float = 0.0) -> Array:

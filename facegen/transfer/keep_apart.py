@@ -121,17 +121,16 @@ class _Lids:
 
     def __init__(self, pieces: PieceMotion, s: str, ball: Eyeball) -> None:
         self._ball, self._rest = ball, pieces.vertices
-        self._inverse = np.linalg.inv(ball.shape)
         faces = np.concatenate([pieces.faces[piece.faces] for piece in pieces.pieces if piece.kind == f"eye_{s}"])
-        corners = ((pieces.vertices - ball.centre) @ self._inverse)[faces]
+        away = ball.in_radii(pieces.vertices)
+        corners = away[faces]
         self._farthest = np.linalg.norm(corners, axis=2).max()
         # A direction d meets the triangle a, b, c where d = l1 a + l2 b + l3 c with no l below zero, at 1 / sum l.
         solid = np.abs(np.linalg.det(corners)) > _SLIVER * np.linalg.norm(corners, axis=2).prod(axis=1)
         self._meets = np.linalg.inv(np.swapaxes(corners[solid], 1, 2))
         middles = corners[solid].mean(axis=1)
         self._middles = cKDTree(middles / np.maximum(np.linalg.norm(middles, axis=1), _TINY)[:, None])
-        away = (pieces.vertices - ball.centre) @ self._inverse
-        look = self._inverse @ (pieces.face.eye(s) - ball.centre)
+        look = ball.in_radii(pieces.face.eye(s))
         look = look / max(np.linalg.norm(look), _TINY)
         near = (np.linalg.norm(away, axis=1) < _LID_REACH) & (away @ look > _LID_BACK)
         # A lid's back may lie in the eye, where nobody sees it: its front may not.
@@ -153,7 +152,7 @@ class _Lids:
 
     def _clearance(self, places: Array, turn: Array) -> Array:
         """Return how far outside the eye places (s, 3) lie, mm; infinite where that is beyond doubt."""
-        away = (places - self._ball.centre) @ self._inverse
+        away = self._ball.in_radii(places)
         length = np.linalg.norm(away, axis=1)
         result = np.full(len(away), np.inf)
         near = np.flatnonzero((length < self._farthest) & (length > 0))

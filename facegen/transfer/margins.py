@@ -17,6 +17,8 @@ from scipy.sparse.csgraph import dijkstra
 from scipy.spatial import cKDTree
 
 from facegen.geometry.operators import Surface
+from facegen.transfer.sides import SLITS
+from facegen.transfer.skin import Skin
 
 Array = NDArray[np.float64]
 Places = Mapping[str, tuple[NDArray, NDArray]]
@@ -44,9 +46,8 @@ class Slit:
     side: int
 
 
-LIDS = tuple(Slit(f"eye_{s}", (f"eye_inner_{s}", f"eye_outer_{s}"),
-                  *(tuple(f"eye_{edge}{at}_{s}" for at in ("_inner", "", "_outer")) for edge in ("upper", "lower")),
-                  side) for side, s in ((1, "L"), (2, "R")))
+LIDS = tuple(Slit(f"eye_{s}", corners, upper, lower, side)
+             for side, (s, (upper, lower, corners)) in enumerate(zip("LR", SLITS[1:], strict=True), start=1))
 LIPS = Slit("mouth", ("mouth_corner_R", "mouth_corner_L"), ("mouth_inner_top",), ("mouth_inner_bottom",), 0)
 
 
@@ -63,6 +64,25 @@ class Margins:
     is_upper: NDArray[np.bool_]
     corners: NDArray[np.int64]
     line: Array
+
+    def ends(self, places: Array) -> tuple[Array, Array]:
+        """Return the facing places (SAMPLES, 3) of the upper and the lower edge, for the skin's vertices (n, 3)."""
+        return self.upper @ places, self.lower @ places
+
+    def gap(self, places: Array) -> Array:
+        """Return the ways (SAMPLES, 3) from the lower to the upper edge."""
+        upper, lower = self.ends(places)
+        return upper - lower
+
+
+def facing_margins(skin: Skin, slit: Slit) -> tuple[Margins, Margins] | None:
+    """Return the edges of a slit of the template and of the avatar's skin, or None where either has none."""
+    template = skin.template
+    own = find_margins(template.surface, slit, template.places, skin.correspondence.sides)
+    if own is None:
+        return None
+    avatar = find_margins(skin.surface, slit, skin.places, skin.sides, shape=skin.registered, guide=own.line)
+    return None if avatar is None else (own, avatar)
 
 
 def find_margins(surface: Surface, slit: Slit, places: Places, sides: Array, *, shape: Array | None = None,
@@ -110,8 +130,7 @@ def _stops(slit: Slit, names: tuple[str, ...], places: Places) -> NDArray | None
 
 def _curve(stops: Array) -> Array:
     """Return a smooth curve (g, 3) through some places (s, 3)."""
-    steps = np.linalg.norm(np.diff(stops, axis=0), axis=1)
-    t = np.concatenate([[0.0], np.cumsum(np.maximum(steps, 1e-9))])
+    t = _lengths(stops, 1e-9)               # a spline's knots must differ
     return CubicSpline(t, stops)(np.linspace(0, t[-1], _GUIDE))
 
 
@@ -143,15 +162,20 @@ def _along(path: Array) -> Array:
     between the corners, which faces the other edge, half by the way, which never stands still."""
     chord = path[-1] - path[0]
     by_chord = np.maximum.accumulate(np.clip((path - path[0]) @ chord / max(float(chord @ chord), 1e-300), 0.0, 1.0))
-    steps = np.linalg.norm(np.diff(path, axis=0), axis=1)
-    by_way = np.concatenate([[0.0], np.cumsum(steps)]) / max(float(steps.sum()), 1e-300)
+    lengths = _lengths(path)
+    by_way = lengths / max(float(lengths[-1]), 1e-300)
     t = 0.5 * by_chord + 0.5 * by_way
     t[0], t[-1] = 0.0, 1.0
     return t
 
 
+def _lengths(path: Array, least: float = 0.0) -> Array:
+    """Return how far along a path (p, 3) its places are, from 0 on; each step counts for ``least`` or more."""
+    return np.concatenate([[0.0], np.cumsum(np.maximum(np.linalg.norm(np.diff(path, axis=0), axis=1), least))])
+
+
 def _resampled(path: Array, count: int) -> Array:
-    steps = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(path, axis=0), axis=1))])
+    steps = _lengths(path)
     wanted = np.linspace(0, steps[-1], count)
     return np.stack([np.interp(wanted, steps, axis) for axis in path.T], axis=1)
 

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from facegen.errors import InputError
+from facegen.geometry.fade import smooth_step
 from facegen.geometry.operators import Surface
 from facegen.transfer.carried import Carried, SkinFrames
 from facegen.transfer.eyeball import Eyeball, fit_eye
@@ -129,8 +130,7 @@ class _Lining:
         self._at = vertices[self.rows]
         height = (self._at - face.lips) @ face.lip_normal
         reach = _BLEND * max(float(np.abs(height).max()), 1e-300)
-        t = np.clip(0.5 - 0.5 * height / reach, 0.0, 1.0)
-        self._jaw = t * t * (3.0 - 2.0 * t)
+        self._jaw = smooth_step(0.5 - 0.5 * height / reach)
         self._frames = None
         if kind_of_name(piece.name) != "teeth":         # teeth do not bend with the lips
             self._frames = SkinFrames(skin, self._at)

@@ -58,7 +58,7 @@ class Correspondence:
         self.template = template
         self._search = ClosestPoints(template)
         self.sides = sides
-        self._sides = sides[template.faces].mean(axis=1)
+        self._face_sides = sides[template.faces].mean(axis=1)
         _edges, of_side = template.edges
         border = template.border_edges
         self._border_side = border[of_side].reshape(-1, 3)
@@ -70,7 +70,7 @@ class Correspondence:
     def __call__(self, points: NDArray, normals: NDArray, sides: NDArray, *, reach: float,
                  least_cosine: float = _LEAST_COSINE) -> Feet:
         """Return the feet; those beyond reach (mm) or on the template's border count as none."""
-        feet = self._search(points, normals, least_cosine=least_cosine, labels=(sides, self._sides))
+        feet = self._search(points, normals, least_cosine=least_cosine, labels=(sides, self._face_sides))
         beyond = ~(feet.distances <= reach)
         on_side = feet.weights[:, [2, 0, 1]] < 1e-9         # no weight of the corner opposite side k
         beyond |= feet.found & (on_side & self._border_side[feet.faces]).any(axis=1) & (feet.distances > _PAST)

@@ -20,12 +20,13 @@ from facegen.transfer.template import placing
 SLITS = (
     (("mouth_top", "mouth_upper_L", "mouth_upper_R"), ("mouth_bottom", "mouth_lower_L", "mouth_lower_R"),
      ("mouth_corner_L", "mouth_corner_R")),
-    *((tuple(f"{name}_{side}" for name in ("eye_upper", "eye_upper_inner", "eye_upper_outer")),
-       tuple(f"{name}_{side}" for name in ("eye_lower", "eye_lower_inner", "eye_lower_outer")),
+    *((tuple(f"{name}_{side}" for name in ("eye_upper_inner", "eye_upper", "eye_upper_outer")),
+       tuple(f"{name}_{side}" for name in ("eye_lower_inner", "eye_lower", "eye_lower_outer")),
        (f"eye_inner_{side}", f"eye_outer_{side}")) for side in "LR"),
 )
-"""For each slit the landmarks above, below and at its corners. The inner edges of the lips are not among them: where
-lips touch, a person who sets points cannot see on which lip a point lands (see `settled`)."""
+"""For each slit the landmarks above, below and at its corners; those of lids from corner to corner. The inner edges of
+the lips are not among them: where lips touch, a person who sets points cannot see on which lip a point lands (see
+`settled`)."""
 
 _INNER = {"mouth_inner_top": 1.0, "mouth_inner_bottom": -1.0}
 # Because a point on the wrong lip belongs to a vertex about as near on the other: not farther than this, in mm.

@@ -20,6 +20,7 @@ from facegen.geometry.operators import Surface
 from facegen.transfer.alignment import Similarity, align
 from facegen.transfer.baselines import PaperWeights
 from facegen.transfer.closing import closing
+from facegen.transfer.eyeball import EyeFront
 from facegen.transfer.keep_apart import Contact, keep_apart
 from facegen.transfer.landmarks import Landmarks
 from facegen.transfer.margins import LIDS, LIPS
@@ -74,9 +75,8 @@ def transfer(mesh: Mesh, landmarks: Landmarks, template: Template, *, method: st
     contacts: Mapping[str, Contact] = {}
     if method == "landmarks":
         moved = PieceMotion(found, vertices, faces, places)
-        slits = [closing(skin, lids, moved.eyes.get(side), vertices[moved.rows(f"eye_{side}")])
-                 for lids, side in zip(LIDS, "LR", strict=True)]
-        slits = [slit for slit in [*slits, closing(skin, LIPS)] if slit is not None]
+        fronts = {f"eye_{s}": EyeFront(ball, vertices[moved.rows(f"eye_{s}")]) for s, ball in moved.eyes.items()}
+        slits = [slit for slit in (closing(skin, slit, fronts.get(slit.name)) for slit in (*LIDS, LIPS)) if slit]
         _on_skin(motion, rows, [slit.close for slit in slits])
         jaw = None if skin.jaw is None else RigidMotions.of(lambda at: skin.jaw.movement(at, template.jaw))
         motion = moved.move(motion, jaw, template.gaze)

@@ -1,13 +1,11 @@
 """The cartoon that ships: its files are what its script writes; lids, lips and what lies behind them are well made."""
 
-import subprocess
-import sys
 from collections import Counter
 from itertools import pairwise
-from pathlib import Path
 
 import numpy as np
 import pytest
+from authored import AVATARS, check_script, part
 from scipy import sparse
 from scipy.sparse.csgraph import connected_components
 
@@ -15,7 +13,7 @@ from facegen.face.landmarks import NAMES
 from facegen.fileio.obj import load_obj
 from facegen.transfer.landmarks import check_places, load_landmarks
 
-HERE = Path(__file__).parents[2] / "meshes" / "avatars" / "cartoon"
+HERE = AVATARS / "cartoon"
 HEIGHT = 2.0
 
 
@@ -27,10 +25,6 @@ def mesh():
 @pytest.fixture(scope="module")
 def marks(mesh):
     return load_landmarks(HERE / "landmarks.yaml", mesh, mesh_name="cartoon.obj")
-
-
-def part(mesh, name):
-    return mesh.faces[mesh.face_parts == mesh.parts.index(name)]
 
 
 def edges(faces):
@@ -73,13 +67,7 @@ def crossings(vertices, ours, theirs):
 
 
 def test_the_script_writes_what_ships(tmp_path):
-    subprocess.run([sys.executable, HERE / "author.py", tmp_path], check=True)
-    assert (tmp_path / "cartoon.mtl").read_text() == (HERE / "cartoon.mtl").read_text()
-    new, old = ((folder / "cartoon.obj").read_text().splitlines() for folder in (tmp_path, HERE))
-    assert [line for line in new if line[:2] != "v "] == [line for line in old if line[:2] != "v "]
-    # Another machine's arithmetic may round the last of five decimals otherwise.
-    places = [np.loadtxt([line[2:] for line in lines if line[:2] == "v "]) for lines in (new, old)]
-    np.testing.assert_allclose(*places, atol=2e-5)
+    check_script("cartoon", tmp_path, last_decimal=2e-5)
 
 
 def test_it_has_few_polygons_and_separate_parts(mesh):

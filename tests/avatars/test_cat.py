@@ -1,18 +1,16 @@
 """The cat that ships: its files are what its script writes, its lids and its mouth can close and open."""
 
-import subprocess
-import sys
 from collections import Counter
-from pathlib import Path
 
 import numpy as np
 import pytest
+from authored import AVATARS, check_script, part
 
 from facegen.face.landmarks import REQUIRED
 from facegen.fileio.obj import load_obj
 from facegen.transfer.landmarks import check_places, load_landmarks
 
-HERE = Path(__file__).parents[2] / "meshes" / "avatars" / "cat"
+HERE = AVATARS / "cat"
 
 
 @pytest.fixture(scope="module")
@@ -28,18 +26,8 @@ def points(mesh):
     return marks.points(mesh.vertices)
 
 
-def part(mesh, name):
-    return mesh.faces[mesh.face_parts == mesh.parts.index(name)]
-
-
 def test_the_script_writes_what_ships(tmp_path):
-    subprocess.run([sys.executable, HERE / "author.py", tmp_path], check=True)
-    assert (tmp_path / "cat.mtl").read_text() == (HERE / "cat.mtl").read_text()
-    new, old = ((folder / "cat.obj").read_text().splitlines() for folder in (tmp_path, HERE))
-    assert [line for line in new if line[:2] != "v "] == [line for line in old if line[:2] != "v "]
-    # Another machine's arithmetic may round the last decimal otherwise.
-    places = [np.loadtxt([line[2:] for line in lines if line[:2] == "v "]) for lines in (new, old)]
-    np.testing.assert_allclose(*places, atol=2e-3)
+    check_script("cat", tmp_path, last_decimal=2e-3)
 
 
 def test_no_side_of_the_skin_has_more_than_two_triangles(mesh):

@@ -8,7 +8,7 @@ from facegen.face.face import load_face
 from facegen.fileio.avatar import load_avatar
 from facegen.render import render_passes
 from facegen.transfer.closing import closing
-from facegen.transfer.margins import LIDS, LIPS, find_margins
+from facegen.transfer.margins import LIDS, LIPS, facing_margins, find_margins
 from facegen.transfer.rig import avatar_names, rig
 from facegen.transfer.skin import lay_skin
 
@@ -33,10 +33,7 @@ def skin_shapes(rigged):
 def gaps(rigged, slit, moved):
     """Distances of facing places of a slit's edges, mm."""
     skin = rigged.found.skin
-    own = find_margins(skin.template.surface, slit, skin.template.places, skin.correspondence.sides)
-    edges = find_margins(skin.surface, slit, skin.places, skin.sides, shape=skin.registered, guide=own.line)
-    places = skin.surface.vertices + moved
-    return np.linalg.norm(edges.upper @ places - edges.lower @ places, axis=1)
+    return np.linalg.norm(facing_margins(skin, slit)[1].gap(skin.surface.vertices + moved), axis=1)
 
 
 @pytest.mark.parametrize(("slit", "name"), [(LIDS[0], "eyeBlinkLeft"), (LIDS[1], "eyeBlinkRight")])

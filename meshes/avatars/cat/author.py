@@ -2,9 +2,9 @@
 
     python meshes/avatars/cat/author.py [FOLDER]
 
-writes ``cat.obj``, ``cat.mtl`` and ``landmarks.yaml`` beside this script, or into the folder. Centimetres; +x the cat's left, +y up, +z
-forward. The head is modelled in clay (model.py); everything here is about its surface: what runs along a loop or a
-line, how dense the triangles are, which colour they have.
+writes ``cat.obj``, ``cat.mtl`` and ``landmarks.yaml`` beside this script, or into the folder. Centimetres; +x the cat's
+left, +y up, +z forward. The head is modelled in clay (model.py); everything here is about its surface: what runs along
+a loop or a line, how dense the triangles are, which colour they have.
 """
 
 from __future__ import annotations
@@ -19,13 +19,13 @@ HERE = Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE.parent / "kit"))
 
 import model  # noqa: E402
-from clay import Clay, curve  # noqa: E402
+from clay import Clay, curve, mirrored  # noqa: E402
 from cover import cover, directions, in_polygon, inside, scatter, walk  # noqa: E402
 from eyes import almond, ellipse, eyeball, lid_rings  # noqa: E402
 from mouth import gum_and_teeth, lip_rows, tongue  # noqa: E402
 from numpy.typing import NDArray  # noqa: E402
 from saving import both_sides, save_avatar  # noqa: E402
-from sheet import Sheet  # noqa: E402
+from sheet import Sheet, mirror_image  # noqa: E402
 
 from facegen.geometry.mesh import Mesh, merge  # noqa: E402
 
@@ -303,6 +303,11 @@ def whiskers(clay: Clay) -> Sheet:
     return sheet
 
 
+def arch(*left: tuple[float, float, float]) -> NDArray:
+    """Return an arch (2 k - 1, 3) from its left half (k places), the middle last."""
+    return np.concatenate([left, mirrored(left[-2::-1])])
+
+
 def inner_parts() -> list[Mesh]:
     """Return eyeballs, teeth and tongue."""
     n = LID - 4
@@ -337,24 +342,8 @@ def inner_parts() -> list[Mesh]:
             (0.38, (0.3, 0.16, 0.26)),
         )
     ]
-    arch_upper = [
-        (1.05, -1.72, 2.2),
-        (0.92, -1.72, 3.0),
-        (0.58, -1.7, 3.55),
-        (0, -1.66, 3.8),
-        (-0.58, -1.7, 3.55),
-        (-0.92, -1.72, 3.0),
-        (-1.05, -1.72, 2.2),
-    ]
-    arch_lower = [
-        (0.92, -2.62, 2.0),
-        (0.8, -2.64, 2.8),
-        (0.46, -2.62, 3.3),
-        (0, -2.6, 3.5),
-        (-0.46, -2.62, 3.3),
-        (-0.8, -2.64, 2.8),
-        (-0.92, -2.62, 2.0),
-    ]
+    arch_upper = arch((1.05, -1.72, 2.2), (0.92, -1.72, 3.0), (0.58, -1.7, 3.55), (0, -1.66, 3.8))
+    arch_lower = arch((0.92, -2.62, 2.0), (0.8, -2.64, 2.8), (0.46, -2.62, 3.3), (0, -2.6, 3.5))
     return [
         *eyes,
         gum_and_teeth("teeth_upper", arch_upper, (0, -1, 0), 0.19, upper, lean=0.05).mesh(),
@@ -368,7 +357,7 @@ def inner_parts() -> list[Mesh]:
     ]
 
 
-def landmarks(clay: Clay, mesh: Mesh) -> dict[str, str]:
+def landmarks(clay: Clay, mesh: Mesh) -> dict[str, int]:
     lids = lid_rings(model.EYE, clay, OPENING, **LID_RINGS)[3]
     slit = clay.onto(curve(model.MOUTH_LINE, LIP + 1), 0.0)
     slit[0, 0] = 0.0
@@ -408,30 +397,14 @@ def landmarks(clay: Clay, mesh: Mesh) -> dict[str, str]:
         "head_back": clay.shoot(np.array([0, 0.6, 0.0]), np.array([[0.0, 0.0, -1.0]]), 8.0)[0],
         "neck": clay.shoot(np.array([0, -4.2, -2.2]), np.array([[0.0, -0.5, 1.0]]), 6.0)[0],
     }
-    return both_sides(mesh, places, DECIMALS)
+    return both_sides(mesh, places)
 
 
-def build() -> tuple[Mesh, dict[str, str]]:
+def build() -> tuple[Mesh, dict[str, int]]:
     clay = model.clay()
-    mesh = merge([head(clay).mesh(mirror=True), *inner_parts(), both(whiskers(clay).mesh())])
+    left = whiskers(clay).mesh()
+    mesh = merge([head(clay).mesh(mirror=True), *inner_parts(), merge([left, mirror_image(left)])])
     return mesh, landmarks(clay, mesh)
-
-
-def both(mesh: Mesh) -> Mesh:
-    """Return a piece of the left side together with its mirror image."""
-    return merge(
-        [
-            mesh,
-            Mesh(
-                mesh.vertices * (-1, 1, 1),
-                mesh.faces[:, ::-1],
-                mesh.materials,
-                mesh.face_materials,
-                mesh.parts,
-                mesh.face_parts,
-            ),
-        ]
-    )
 
 
 if __name__ == "__main__":

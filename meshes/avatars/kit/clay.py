@@ -150,6 +150,11 @@ def curve(points: Sequence[ArrayLike], count: int, power: float = 1.0) -> NDArra
         for a, b, c, d in zip(p[:-3], p[1:-2], p[2:-1], p[3:], strict=True)
     ]
     fine = np.concatenate([*pieces, p[-2:-1]])
-    length = np.concatenate([[0], np.cumsum(np.linalg.norm(np.diff(fine, axis=0), axis=1))])
-    where = (1 - (1 - np.linspace(0, 1, count)) ** power) * length[-1]
-    return np.stack([np.interp(where, length, fine[:, i]) for i in range(fine.shape[1])], axis=1)
+    return on_path(fine, 1 - (1 - np.linspace(0, 1, count)) ** power)
+
+
+def on_path(points: NDArray, shares: NDArray) -> NDArray:
+    """Return places (count, d) on a path (k, d) at shares (count,) of its length, 0 to 1."""
+    length = np.concatenate([[0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
+    where = shares * length[-1]
+    return np.stack([np.interp(where, length, axis) for axis in points.T], axis=1)

@@ -6,9 +6,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from clay import Clay, mirrored
+from clay import Clay, on_path
 from numpy.typing import ArrayLike, NDArray
-from sheet import Sheet
+from sheet import Sheet, mirror_image
 
 from facegen.geometry.mesh import Mesh
 
@@ -67,8 +67,8 @@ def almond(
     rise *= 1 - np.sign(s) * lean * x
     y = np.where(s > 0, upper, -lower) * rise - inner_drop * np.clip(-x, 0, 1) ** 4
     fine = np.radians(np.stack([width * x, y], axis=1))
-    half = count // 2
-    upper_lid, lower_lid = _evenly(fine[:361], half + 1), _evenly(fine[360:], half + 1)
+    evenly = np.linspace(0, 1, count // 2 + 1)
+    upper_lid, lower_lid = on_path(fine[:361], evenly), on_path(fine[360:], evenly)
     return np.concatenate([upper_lid[:-1], lower_lid[:-1]])
 
 
@@ -76,12 +76,6 @@ def ellipse(count: int, width: float, height: float) -> NDArray:
     """Return an ellipse (count, 2) in radians, half axes in degrees, starting at the outer side."""
     t = 2 * np.pi * np.arange(count) / count
     return np.radians(np.stack([width * np.cos(t), height * np.sin(t)], axis=1))
-
-
-def _evenly(points: NDArray, count: int) -> NDArray:
-    length = np.concatenate([[0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
-    where = np.linspace(0, length[-1], count)
-    return np.stack([np.interp(where, length, points[:, i]) for i in range(2)], axis=1)
 
 
 def lid_rings(
@@ -131,9 +125,4 @@ def eyeball(part: str, eye: Eye, outlines: Sequence[NDArray], materials: Sequenc
     for a, b, name in zip(rings[:-1], rings[1:], names, strict=True):
         sheet.band(a, b, name)
     sheet.cap(rings[-1], materials[-1], eye.on_ball([[0.0, np.pi]]))
-    mesh = sheet.mesh()
-    if not mirror:
-        return mesh
-    return Mesh(
-        mirrored(mesh.vertices), mesh.faces[:, ::-1], mesh.materials, mesh.face_materials, mesh.parts, mesh.face_parts
-    )
+    return mirror_image(sheet.mesh()) if mirror else sheet.mesh()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Sequence
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -91,6 +92,11 @@ class Sheet:
             (self.part,),
             np.zeros(len(faces), int),
         )
+
+
+def mirror_image(mesh: Mesh) -> Mesh:
+    """Return the mesh on the other side of the plane x = 0, still outside out."""
+    return replace(mesh, vertices=mirrored(mesh.vertices), faces=mesh.faces[:, ::-1])
 
 
 def orient(faces: NDArray, vertices: NDArray) -> NDArray:
