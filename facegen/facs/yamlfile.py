@@ -92,6 +92,8 @@ def _describe(error: Exception) -> str:
     mark = getattr(error, "problem_mark", None) or getattr(error, "context_mark", None)
     what = getattr(error, "problem", None) or getattr(error, "reason", None) or str(error)
     where = f"line {mark.line + 1}, column {mark.column + 1}: " if mark else ""
+    if "nesting depth" in str(what):  # libyaml's own limit, met while it scans ahead of our first event
+        return f"{where}nested deeper than {MAX_DEPTH} levels"
     return f"{where}not valid YAML: {' '.join(str(what).split())}"
 
 
