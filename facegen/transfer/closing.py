@@ -31,6 +31,8 @@ _LEAST_CLOSING = 0.1
 _PARTED = 1.0
 # Millimetres: a miss of this size counts half; on a faithful copy there is none to mend.
 _TOLERATED = 0.05
+# Millimetres by which a rim may move otherwise than its edge: a lid rolls as it closes.
+_ROLLS = 0.5
 # A slit counts as shut where the template leaves no more than this share of it, and this many mm.
 _SHUT, _SHUT_MM = 0.06, 0.3
 # Lids keep the distance from the ball that they have at rest, up to so many radii from its centre.
@@ -69,9 +71,22 @@ class Closing:
         wanted = self.wanted
         for k in np.flatnonzero(wanted.active.max(axis=1) > 0):
             missing = wanted.active[k, :, None] * (wanted.gap[k] - self.margins.gap(self.rest + motion[k]))
-            missing = missing * _beyond(missing)[:, None]
+            counts = _beyond(missing)
+            missing = missing * counts[:, None]
             share = wanted.upper_share[k]
             self._move(motion[k], self.field.steps(share * missing, (share - 1.0) * missing))
+            if self.eye is not None:
+                self._move(motion[k], counts.max() * self._to_edges(motion[k]))
+
+    def _to_edges(self, motion: Array) -> Array:
+        """Return what brings the rims, which moved as (n, 3), to where they move as their edges do."""
+        field = self.field
+        edges = (self.field.along @ edge for edge in self.margins.ends(motion))
+        step = np.zeros((len(field.rows), 3))
+        for share, edge in zip((field.on_upper, field.on_lower), edges, strict=True):
+            away = edge - motion[field.rows]
+            step += (share * _beyond(away, _ROLLS))[:, None] * away
+        return step
 
     def seal(self, motion: Array) -> None:
         """Bring edges that are shut onto one line, no nearer to the eye than either, in place."""
@@ -164,10 +179,10 @@ def _told_lids(gap: Array, upper: Array, lower: Array, own_gap: Array, part: Arr
     return _Wanted(target, active, share, shut)
 
 
-def _beyond(missing: Array) -> Array:
+def _beyond(missing: Array, tolerated: float = _TOLERATED) -> Array:
     """Return how much misses (s, 3) count: not at all where a faithful copy misses nothing."""
     square = (missing**2).sum(axis=1)
-    return square / (square + _TOLERATED**2)
+    return square / (square + tolerated**2)
 
 
 def _unit(ways: Array) -> Array:

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 from scipy.spatial import cKDTree
 
+from facegen.geometry.fade import smooth_step
 from facegen.geometry.factor import Factor
 from facegen.geometry.operators import Surface, dirichlet, hinge_energy
 from facegen.transfer.margins import SAMPLES, Margins
@@ -22,6 +23,10 @@ _REACH = 0.5
 _STRETCH = 0.004
 # How firmly edges, corners and the field's end are held, times the largest diagonal entry.
 _HOLD = 1e4
+# A rim ends where one edge is so many times as near as the other, and fades until then from the first of these on.
+_RIM, _BESIDE = 0.1, 0.3
+# An edge is sampled at so many places to tell how far off it is.
+_FINE = 8 * SAMPLES
 # Because vertices that nothing holds, of a piece beside the slit, must stay: this share of the largest entry.
 _TIE = 1e-12
 
@@ -29,13 +34,16 @@ _TIE = 1e-12
 @dataclass(frozen=True, eq=False)
 class Field:
     """``rows`` (r,): the skin's vertices near the slit; ``upper``, ``lower`` (r,): how much they go with either edge;
-    ``along`` (r, SAMPLES): weights of their place along the slit; ``edges`` (e, 2): the mesh's, among them."""
+    ``along`` (r, SAMPLES): weights of their place along the slit; ``edges`` (e, 2): the mesh's, among them;
+    ``on_upper``, ``on_lower`` (r,): how much they belong to the rim of an open slit, which moves as its edge does."""
 
     rows: NDArray[np.int64]
     upper: Array
     lower: Array
     along: sparse.csr_array
     edges: NDArray[np.int32]
+    on_upper: Array
+    on_lower: Array
 
     def steps(self, upper: Array, lower: Array) -> Array:
         """Return how the vertices move (r, 3) when places along the edges move by (SAMPLES, 3)."""
@@ -62,7 +70,17 @@ def closing_field(skin: Skin, template: Margins, avatar: Margins) -> Field:
         scale * hold[:, None] * wanted)
     upper, lower = np.clip(solved, 0.0, 1.0).T
     upper[on_edge], lower[on_edge] = wanted[on_edge].T
-    return Field(rows, upper, lower, _along(skin, avatar, rows, on_edge), surface.edges[0])
+    return Field(rows, upper, lower, _along(skin, avatar, rows, on_edge), surface.edges[0],
+                 *_rims(surface.vertices, *avatar.ends(skin.surface.vertices)))
+
+
+def _rims(places: Array, upper: Array, lower: Array) -> tuple[Array, Array]:
+    """Return how much places (r, 3) belong to the rims of edges (SAMPLES, 3): those much nearer to one of them."""
+    fine = np.linspace(0, SAMPLES - 1, _FINE)
+    edges = (np.stack([np.interp(fine, np.arange(SAMPLES), axis) for axis in edge.T], axis=1) for edge in (upper, lower))
+    to_upper, to_lower = (cKDTree(edge).query(places)[0] for edge in edges)
+    farther = np.maximum(np.maximum(to_upper, to_lower), 1e-300)
+    return tuple(smooth_step((_BESIDE - to / farther) / (_BESIDE - _RIM)) for to in (to_upper, to_lower))
 
 
 def _along(skin: Skin, margins: Margins, rows: NDArray, on_edge: NDArray) -> sparse.csr_array:
