@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 from scipy import sparse
 from scipy.spatial import cKDTree
 
-from facegen.geometry.fade import smooth_step
 from facegen.geometry.factor import Factor
+from facegen.geometry.fade import smooth_step
 from facegen.geometry.operators import Surface, dirichlet, hinge_energy
 from facegen.transfer.margins import SAMPLES, Margins
 from facegen.transfer.skin import Skin
@@ -76,11 +76,12 @@ def closing_field(skin: Skin, template: Margins, avatar: Margins) -> Field:
 
 def _rims(places: Array, upper: Array, lower: Array) -> tuple[Array, Array]:
     """Return how much places (r, 3) belong to the rims of edges (SAMPLES, 3): those much nearer to one of them."""
-    fine = np.linspace(0, SAMPLES - 1, _FINE)
-    edges = (np.stack([np.interp(fine, np.arange(SAMPLES), axis) for axis in edge.T], axis=1) for edge in (upper, lower))
+    at, fine = np.arange(SAMPLES), np.linspace(0, SAMPLES - 1, _FINE)
+    edges = (np.stack([np.interp(fine, at, axis) for axis in edge.T], axis=1) for edge in (upper, lower))
     to_upper, to_lower = (cKDTree(edge).query(places)[0] for edge in edges)
     farther = np.maximum(np.maximum(to_upper, to_lower), 1e-300)
-    return tuple(smooth_step((_BESIDE - to / farther) / (_BESIDE - _RIM)) for to in (to_upper, to_lower))
+    on_upper, on_lower = (smooth_step((_BESIDE - to / farther) / (_BESIDE - _RIM)) for to in (to_upper, to_lower))
+    return on_upper, on_lower
 
 
 def _along(skin: Skin, margins: Margins, rows: NDArray, on_edge: NDArray) -> sparse.csr_array:
