@@ -3,8 +3,9 @@
 Based on: Onizuka et al. (2018), section 5, which leaves open lids that stay open. A slit's edges are compared at places
 that face each other. How far the template closes the slit there is told to the avatar's own gap: what the transfer
 missed is added along the avatar's own closing direction, spread over the lid by a smooth field that is 1 on its edge
-and 0 on the other edge and at the brow. Round an eye it moves on an arc about the ball. Lips, which may touch at rest,
-touch where the template's have not parted.
+and 0 on the other edge and at the brow. Round an eye it moves on an arc about the ball, and a lid's rim, where the
+transfer may scatter what the template keeps together, moves as its edge does. Lips, which may touch at rest, touch
+where the template's have not parted.
 """
 
 from __future__ import annotations
@@ -81,7 +82,7 @@ class Closing:
     def _to_edges(self, motion: Array) -> Array:
         """Return what brings the rims, which moved as (n, 3), to where they move as their edges do."""
         field = self.field
-        edges = (self.field.along @ edge for edge in self.margins.ends(motion))
+        edges = (field.along @ edge for edge in self.margins.ends(motion))
         step = np.zeros((len(field.rows), 3))
         for share, edge in zip((field.on_upper, field.on_lower), edges, strict=True):
             away = edge - motion[field.rows]

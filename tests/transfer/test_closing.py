@@ -45,6 +45,20 @@ def test_a_blink_closes_the_lids(rigged, skin_shapes, slit, name):
     assert 0.4 < half < 0.6
 
 
+@pytest.mark.parametrize(("slit", "name"), [(LIDS[0], "eyeBlinkLeft"), (LIDS[1], "eyeBlinkRight")])
+def test_a_rim_moves_as_its_edge_does(rigged, skin_shapes, slit, name):
+    """Scattered, it would be torn into points, or one of its sides stretched over the eye."""
+    skin, moved = rigged.found.skin, skin_shapes[name]
+    places, margins = skin.surface.vertices, facing_margins(skin, slit)[1]
+    edge = margins.rows[margins.is_upper]
+    to_upper, nearest = cKDTree(places[edge]).query(places)
+    to_lower = cKDTree(margins.ends(places)[1]).query(places)[0]
+    rim = np.flatnonzero((to_upper < 0.1 * to_lower) & (to_upper > 0))
+    assert len(rim) > 5
+    away = np.linalg.norm(moved[rim] - moved[edge[nearest[rim]]], axis=1)
+    assert away.max() < 0.1 * gaps(rigged, slit, 0.0).max()
+
+
 def test_a_camera_sees_no_eye_through_shut_lids(rigged):
     face = load_face(rigged.path)
     eyes = [i + 1 for i, name in enumerate(face.mesh().parts) if name.startswith("eye")]
