@@ -25,8 +25,9 @@ Array = NDArray[np.float64]
 
 # A lining's jaw share goes from none to all over this share of its height, from the lip line both ways.
 _BLEND = 0.35
-# Its rim follows the lips within this share of the face's height: three millimetres on a person.
-_RIM = 0.03
+# It follows the skin over it, so that lips that draw back do not bare it, wholly up to the first of these shares of the
+# face's height, six millimetres on a person, and not at all from the second on.
+_FOLLOWS, _LEFT = 0.06, 0.16
 
 
 @dataclass(frozen=True, eq=False)
@@ -134,7 +135,7 @@ class _Lining:
         self._frames = None
         if kind_of_name(piece.name) != "teeth":         # teeth do not bend with the lips
             self._frames = SkinFrames(skin, self._at)
-            self._rim = np.exp(-(self._frames.distances / (_RIM * face.height)) ** 2)
+            self._follows = smooth_step((_LEFT - self._frames.distances / face.height) / (_LEFT - _FOLLOWS))
 
     def move(self, motion: Array, jaw: RigidMotions | None) -> Array:
         """Return the displacements (k, p, 3)."""
@@ -143,4 +144,4 @@ class _Lining:
         if self._frames is None:
             return inner
         lips = np.einsum("pc,kpci->kpi", self._frames.weights, motion[:, self._frames.corners])
-        return inner + self._rim[:, None] * (lips - inner)
+        return inner + self._follows[:, None] * (lips - inner)
