@@ -19,8 +19,8 @@ _TRIED = 12
 _FIRST = 3
 # Because a triangle with a side of more than this many typical sides would be missed by its middle alone.
 _LARGE = 2.0
-# Labels of two places contradict each other where their product is below this. Because the edges of closed lips, a tenth
-# of a millimetre apart, have labels of a quarter and more with opposite signs, and a cheek beside them has less.
+# Labels of two places contradict each other where their product is below this. Because the edges of closed lips, a
+# tenth of a millimetre apart, have labels of a quarter with opposite signs, and a cheek beside them has less.
 _CONTRADICTION = -0.01
 _TINY = 1e-300
 

@@ -25,8 +25,8 @@ Array = NDArray[np.float64]
 
 # A lining's jaw share goes from none to all over this share of its height, from the lip line both ways.
 _BLEND = 0.35
-# It follows the skin over it, so that cheeks and lips that draw in do not bare it: wholly up to the first of these shares
-# of the face's height, four millimetres on a person, and not at all from the second on.
+# It follows the skin over it, so that cheeks and lips that draw in do not bare it: wholly up to the first of these
+# shares of the face's height, four millimetres on a person, and not at all from the second on.
 _FOLLOWS, _LEFT = 0.04, 0.12
 
 

@@ -65,8 +65,9 @@ class Transfer:
     def __init__(self, surface: Surface, template: Surface, feet: Feet, triangle_feet: Feet, matrices: NDArray,
                  turns: NDArray, landmarks: sparse.csr_array, landmark_motion: sparse.csr_array,
                  weights: Weights = OURS, sides: NDArray | None = None) -> None:
-        """surface, template: the skins. sides (n, s): `side_fields` of the surface. feet: of the avatar's vertices (n,), triangle_feet: of its triangles' middles
-        (m,). matrices (n, 3, 3): M; turns (n, 3, 3): R. landmarks (l, n); landmark_motion (3 l, 3 n_s): M r."""
+        """surface, template: the skins. feet: of the avatar's vertices (n,), triangle_feet: of its triangles' middles
+        (m,). matrices (n, 3, 3): M; turns (n, 3, 3): R. landmarks (l, n); landmark_motion (3 l, 3 n_s): M r. sides
+        (n, s): `side_fields` of the surface, which keep a lip's lining with its own lip."""
         n, n_s = len(surface.vertices), len(template.vertices)
         trust = 1 / (1 + (np.where(feet.found, feet.distances, 0) / _FADE) ** 2)
         lining, lined = _lining(surface, feet.found, sides)

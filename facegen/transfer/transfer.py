@@ -21,6 +21,7 @@ from facegen.transfer.alignment import Similarity, align
 from facegen.transfer.baselines import PaperWeights
 from facegen.transfer.closing import closing
 from facegen.transfer.eyeball import EyeFront
+from facegen.transfer.halfway import halfway
 from facegen.transfer.keep_apart import Contact, keep_apart
 from facegen.transfer.landmarks import Landmarks
 from facegen.transfer.margins import LIDS, LIPS
@@ -39,13 +40,15 @@ _LEAST_OPENING, _MOST_OPENING = 0.1, 3.0
 class Transferred:
     """``shapes``: name -> displacement (n, 3) of the avatar's own vertices, in its own axes and units. ``frame``: from
     there to the template's. ``skin``, ``pieces``: what the avatar was taken for; ``contacts``: how far eyes and teeth
-    went through the skin before and after they were kept apart, mm."""
+    went through the skin before and after they were kept apart, mm. ``halves``: shape -> its corrective half way, see
+    `halfway`."""
 
     shapes: Mapping[str, NDArray]
     frame: Similarity
     skin: Skin
     pieces: tuple[Piece, ...]
     contacts: Mapping[str, Contact]
+    halves: Mapping[str, NDArray]
 
 
 def transfer(mesh: Mesh, landmarks: Landmarks, template: Template, *, method: str = "landmarks",
@@ -73,6 +76,7 @@ def transfer(mesh: Mesh, landmarks: Landmarks, template: Template, *, method: st
     motion = np.zeros((len(template.names), len(vertices), 3))
     motion[:, rows] = skin.motion(method, weights)
     contacts: Mapping[str, Contact] = {}
+    halves: Mapping[int, NDArray] = {}
     if method == "landmarks":
         moved = PieceMotion(found, vertices, faces, places)
         fronts = {f"eye_{s}": EyeFront(ball, vertices[moved.rows(f"eye_{s}")]) for s, ball in moved.eyes.items()}
@@ -82,13 +86,17 @@ def transfer(mesh: Mesh, landmarks: Landmarks, template: Template, *, method: st
         motion = moved.move(motion, jaw, template.gaze)
         motion, contacts = keep_apart(moved, motion, template.gaze)
         _on_skin(motion, rows, [slit.seal for slit in slits])
+        lids = [slit for slit in slits if slit.eye is not None]
+        still = ~(template.jaw.any(axis=1) | template.gaze.any(axis=1))
+        halves = halfway(moved, lids, rows, motion, still)
     result = motion.copy()
     for row, other in enumerate(template.minus):
         if other >= 0:
             result[row] -= motion[other]
     back = frame.inverse()
     shapes = {name: back.apply_vectors(result[row][own]) for row, name in enumerate(template.names)}
-    return Transferred(shapes, frame, skin, found, contacts)
+    bent = {template.names[k]: back.apply_vectors(one[own]) for k, one in halves.items()}
+    return Transferred(shapes, frame, skin, found, contacts, bent)
 
 
 def _on_skin(motion: NDArray, rows: NDArray, steps: Sequence[Callable[[NDArray], None]]) -> None:

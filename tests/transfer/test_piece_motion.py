@@ -332,7 +332,7 @@ def test_a_lining_does_not_come_through_the_lip():
     avatar, moves = prepared()
     at = moves.vertices - avatar.points["mouth_bottom"]
     front = moves.rows("skin")
-    front = front[at[front, 2] > -1.5]                                       # the skin that is seen, not what lies behind
+    front = front[at[front, 2] > -1.5]              # the skin that is seen, not what lies behind
     motion = np.zeros((1, *moves.vertices.shape))
     motion[0, front, 2] = -8.0 * np.exp(-(at[front] ** 2).sum(axis=1) / 15.0**2)
     out, found = keep_apart(moves, motion)
