@@ -22,16 +22,20 @@ _LEAST_PIVOT = 1e-13
 
 
 class Factor:
-    """The factorised matrix A (n, n): ``Factor(A).solve(b)``. InputError if A is singular to working precision."""
+    """The factorised matrix A (n, n): ``Factor(A).solve(b)``. InputError if A is singular to working precision.
 
-    def __init__(self, matrix: sparse.sparray, *, what: str = "the system") -> None:
-        self._matrix = sparse.csc_array(matrix)
-        diagonal = self._matrix.diagonal()
-        if not np.isfinite(self._matrix.data).all() or not len(diagonal) or diagonal.min() <= 0:
+    spent: the factor of another matrix, which is no longer needed. If that has its entries at the same places, qdldl
+    uses its order of elimination again, which saves half the time.
+    """
+
+    def __init__(self, matrix: sparse.sparray, *, what: str = "the system", spent: Factor | None = None) -> None:
+        matrix = sparse.csc_array(matrix)
+        diagonal = matrix.diagonal()
+        if not np.isfinite(matrix.data).all() or not len(diagonal) or diagonal.min() <= 0:
             raise InputError(f"{what} cannot be solved: a vertex is tied to nothing, or a number is not finite")
         # Scaled to a unit diagonal: pivots of different places can then be compared.
         self._scale = 1 / np.sqrt(diagonal)
-        scaled = sparse.csc_array(self._matrix * self._scale[:, None] * self._scale[None, :])
+        scaled = sparse.csc_array(matrix * self._scale[:, None] * self._scale[None, :])
         library = _qdldl()
         try:
             if library is None:
@@ -39,13 +43,24 @@ class Factor:
                                                   options={"SymmetricMode": True})
                 pivots = np.abs(self._factor.U.diagonal())
             else:
-                self._factor = library.Solver(sparse.csc_matrix(sparse.triu(scaled, format="csc")), upper=True)
+                self._upper = sparse.csc_matrix(sparse.triu(scaled, format="csc"))
+                if spent is not None and spent._has_places_of(self._upper):
+                    self._factor = spent._factor
+                    self._factor.update(self._upper, upper=True)
+                else:
+                    self._factor = library.Solver(self._upper, upper=True)
                 pivots = np.abs(self._factor.factors()[1])
         except RuntimeError as error:
             raise InputError(f"{what} is singular ({error}): a part of the mesh is tied to nothing") from None
         if not np.isfinite(pivots).all() or pivots.min() < _LEAST_PIVOT * pivots.max():
             raise InputError(f"{what} is singular to working precision (pivots {pivots.min():.1e} to "
                              f"{pivots.max():.1e}): a part of the mesh is tied to nothing")
+
+    def _has_places_of(self, upper: sparse.csc_matrix) -> bool:
+        """Whether qdldl factored a matrix with entries where this one has them."""
+        own = getattr(self, "_upper", None)
+        return own is not None and np.array_equal(own.indptr, upper.indptr) and \
+            np.array_equal(own.indices, upper.indices)
 
     def solve(self, right: NDArray) -> NDArray[np.float64]:
         """Return x (n, ...) with A x = right (n, ...)."""

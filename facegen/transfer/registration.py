@@ -88,7 +88,7 @@ def register(surface: Surface, sides: NDArray, landmarks: sparse.csr_array, targ
     n = len(surface.vertices)
     smooth, stay = hinge_energy(surface), dirichlet(surface)
     area = np.maximum(surface.vertex_areas, 1e-6 * surface.vertex_areas.mean())
-    x = surface.vertices.copy()
+    x, factor = surface.vertices.copy(), None
     for step in steps:
         for _ in range(step.repeat):
             pull = np.zeros(n)
@@ -104,6 +104,6 @@ def register(surface: Surface, sides: NDArray, landmarks: sparse.csr_array, targ
             matrix = energy + sparse.diags_array(pull + floor) + hold * (landmarks.T @ landmarks)
             right = pull[:, None] * (goal - surface.vertices)
             right += hold * (landmarks.T @ (targets - landmarks @ surface.vertices))
-            u = Factor(matrix, what="the registration of the avatar").solve(right)
-            x = surface.vertices + u
+            factor = Factor(matrix, what="the registration of the avatar", spent=factor)
+            x = surface.vertices + factor.solve(right)
     return x
