@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from facegen.fileio.kept import Kept
 from facegen.geometry.closest import Feet
 from facegen.geometry.normals import vertex_normals
 from facegen.geometry.operators import Surface
@@ -22,6 +23,7 @@ from facegen.transfer.jaw import JawMotion, avatar_jaw, jaw_share
 from facegen.transfer.part_motion import MEMBERS, PartMotion, part_motion, spread
 from facegen.transfer.refine import BEND, refine
 from facegen.transfer.registration import Correspondence, register
+from facegen.transfer.registration_key import registration_key
 from facegen.transfer.sides import settled, side_fields
 from facegen.transfer.solve import OURS, Transfer, Weights, landmark_matrix
 from facegen.transfer.template import Template, placing
@@ -155,12 +157,14 @@ class Skin:
 
 
 def lay_skin(template: Template, surface: Surface, places: Mapping[str, tuple[NDArray, NDArray]], *,
-             opening: float = 1.0, registered: NDArray | None = None) -> Skin:
+             opening: float = 1.0, kept: Kept | None = None) -> Skin:
     """Return the avatar's skin laid on the template.
 
-    surface: the skin in the template's frame, mm. places: its landmarks. registered: from an earlier call with the same
-    skin, landmarks and template, to save the time. Raises InputError where the mesh cannot be solved.
+    surface: the skin in the template's frame, mm. places: its landmarks. kept: where registrations are found again and
+    kept. Raises InputError where the mesh cannot be solved.
     """
+    key = None if kept is None else registration_key(template, surface, places)
+    registered = None if key is None else kept.find(key, surface.vertices.shape)
     correspondence = Correspondence(template.surface, side_fields(template.surface, template.places))
     sides = side_fields(surface, places)
     places = settled(surface, places, sides)
@@ -169,6 +173,8 @@ def lay_skin(template: Template, surface: Surface, places: Mapping[str, tuple[ND
         targets = np.array([template.landmarks[name] for name in names])
         registered = register(surface, sides, placing(places, names, len(surface.vertices)), targets,
                               correspondence)
+        if key is not None:
+            kept.keep(key, registered)
     return Skin(template, surface, places, sides, registered, correspondence, opening)
 
 

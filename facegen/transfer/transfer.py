@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from facegen.errors import InputError, nearest
+from facegen.fileio.kept import Kept
 from facegen.geometry.closest import ClosestPoints
 from facegen.geometry.mesh import Mesh
 from facegen.geometry.operators import Surface
@@ -50,13 +51,13 @@ class Transferred:
 
 def transfer(mesh: Mesh, landmarks: Landmarks, template: Template, *, method: str = "landmarks",
              weights: Weights | PaperWeights | None = None, opening: float = 1.0,
-             pieces: Mapping[str, str] | None = None) -> Transferred:
+             pieces: Mapping[str, str] | None = None, kept: Kept | None = None) -> Transferred:
     """Return the template's shapes on an avatar.
 
     mesh: the avatar, in any axes and units. landmarks: on it. method: "landmarks" (ours), or a published one to compare
     with: "sumner", "cloning". weights: of the energies; `PAPER` holds the paper's. opening: a factor on how far the jaw
-    opens. pieces: part, material or number of a component -> kind. Raises InputError for what cannot be used: unknown
-    names, a mesh that cannot be solved.
+    opens. pieces: part, material or number of a component -> kind. kept: where registrations are kept and found again.
+    Raises InputError for what cannot be used: unknown names, a mesh that cannot be solved.
     """
     if method not in METHODS:
         raise InputError(f"method: expected {', '.join(METHODS)}, got {method!r}{nearest(str(method), METHODS)}")
@@ -69,7 +70,8 @@ def transfer(mesh: Mesh, landmarks: Landmarks, template: Template, *, method: st
     faces = own[mesh.faces]
     found = find_pieces(vertices, faces, places, names=face_names(mesh), explicit=pieces)
     rows, surface = _skin_surface(vertices, faces, found)
-    skin = lay_skin(template, surface, _skin_places(landmarks, own, rows, surface, places, template), opening=opening)
+    skin = lay_skin(template, surface, _skin_places(landmarks, own, rows, surface, places, template), opening=opening,
+                    kept=kept)
     motion = np.zeros((len(template.names), len(vertices), 3))
     motion[:, rows] = skin.motion(method, weights)
     contacts: Mapping[str, Contact] = {}
