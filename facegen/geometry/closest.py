@@ -19,9 +19,9 @@ _TRIED = 12
 _FIRST = 3
 # Because a triangle with a side of more than this many typical sides would be missed by its middle alone.
 _LARGE = 2.0
-# Because a foot on a side is as near on one triangle as on the other, and rounding is not to decide: of those whose
-# squared distances differ by less than this share, of the square or of a typical triangle's, the first listed counts.
-_SAME = 1e-9
+# Because a foot on a side is as near on one triangle as on the other, and rounding is not to decide: squares of
+# distances count as one below this share, of the square or of a typical triangle's; cosines below that difference.
+_SAME, _ALIKE = 1e-9, 1e-6
 _TINY = 1e-300
 
 
@@ -71,9 +71,9 @@ class ClosestPoints:
         k, rows = min(_TRIED, len(self._owner)), np.arange(len(points))
         apart, near = self._tree.query(points, k=k, workers=-1)
         near, apart = self._owner[near.reshape(len(points), k)], apart.reshape(len(points), k)
-        allowed = np.ones(near.shape, bool)
-        if normals is not None:
-            allowed &= np.einsum("pi,pki->pk", normals, self.surface.normals[near]) > least_cosine
+        facing = np.ones(near.shape) if normals is None else \
+            np.einsum("pi,pki->pk", normals, self.surface.normals[near])
+        allowed = facing > least_cosine
         if labels is not None:
             allowed &= (labels[0][:, None, :] * labels[1][near] > -0.25).all(axis=2)
         v, w = np.zeros((2, len(points), k))
@@ -86,15 +86,22 @@ class ClosestPoints:
         measure(*np.nonzero(allowed & (np.arange(k) < _FIRST)))
         hopeful = apart < (1 + _SAME) * (self._reach[near] + np.sqrt(square[:, :_FIRST].min(axis=1))[:, None])
         measure(*np.nonzero(allowed & (np.arange(k) >= _FIRST) & hopeful))
-        least = square.min(axis=1)
-        as_near = square <= (least + _SAME * (least + self._typical**2))[:, None]
-        best = np.where(as_near, near, len(self._reach)).argmin(axis=1)
+        best = self._best(near, square, facing)
         found = np.isfinite(square[rows, best])
         v, w, faces = v[rows, best], w[rows, best], near[rows, best]
         weights = np.where(found[:, None], np.stack([1 - v - w, v, w], axis=1), 0.0)
         feet = np.einsum("pc,pci->pi", weights, self.surface.corners[faces])
         distances = np.where(found, np.sqrt(((feet - points) ** 2).sum(axis=1)), np.inf)
         return Feet(np.where(found, faces, -1), weights, feet, distances)
+
+    def _best(self, near: NDArray, square: NDArray, facing: NDArray) -> NDArray[np.int64]:
+        """Return which column (p,) of the triangles (p, k) is the nearest; of those as near, the one that faces the
+        point's way most; of those that do alike, the first in the surface's list."""
+        least = square.min(axis=1)
+        as_near = square <= (least + _SAME * (least + self._typical**2))[:, None]
+        facing = np.where(as_near, facing, -np.inf)
+        alike = facing >= facing.max(axis=1)[:, None] - _ALIKE
+        return np.where(alike, near, len(self._reach)).argmin(axis=1)
 
 
 def _planes(corners: NDArray) -> NDArray[np.float64]:

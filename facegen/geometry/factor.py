@@ -17,6 +17,8 @@ from facegen.errors import InputError
 
 # SuperLU solves this many right-hand sides at a time: wide blocks leave the cache and take several times as long.
 _COLUMNS = 3
+# qdldl takes one; so many are turned into columns at a time, because single ones are far apart in memory.
+_COPIED = 24
 # Because a pivot this much smaller than the largest is what remains of a zero after rounding.
 _LEAST_PIVOT = 1e-13
 
@@ -65,16 +67,18 @@ class Factor:
     def solve(self, right: NDArray) -> NDArray[np.float64]:
         """Return x (n, ...) with A x = right (n, ...)."""
         right = np.asarray(right, dtype=np.float64)
-        columns = right.reshape(len(right), -1) * self._scale[:, None]
-        result = np.empty_like(columns)
-        if isinstance(self._factor, sparse.linalg.SuperLU):
-            for start in range(0, columns.shape[1], _COLUMNS):
-                part = slice(start, start + _COLUMNS)
-                result[:, part] = self._factor.solve(np.ascontiguousarray(columns[:, part]))
-        else:
-            for k, column in enumerate(np.ascontiguousarray(columns.T)):
-                result[:, k] = self._factor.solve(column)
-        return (result * self._scale[:, None]).reshape(right.shape)
+        columns, result = right.reshape(len(right), -1), np.empty((len(right), right[:1].size))
+        superlu = isinstance(self._factor, sparse.linalg.SuperLU)
+        width = _COLUMNS if superlu else _COPIED
+        for start in range(0, columns.shape[1], width):
+            part = slice(start, start + width)
+            scaled = columns[:, part] * self._scale[:, None]
+            if superlu:
+                solved = self._factor.solve(scaled)
+            else:
+                solved = np.stack([self._factor.solve(column) for column in np.ascontiguousarray(scaled.T)], axis=1)
+            result[:, part] = solved * self._scale[:, None]
+        return result.reshape(right.shape)
 
 
 @cache

@@ -42,6 +42,8 @@ _ON_THE_BALL = 1.25
 _LIFTED, _OUT = 0.15, 0.02
 # The middle of a triangle with sides s lies nearer to the eye than its corners: sqrt(1 - s^2 / 3), at most so much.
 _MOST_SAG = 0.3
+# What counts less than this is rounding: most shapes leave a slit as it is.
+_NOTHING = 1e-9
 _TINY = 1e-300
 
 
@@ -73,6 +75,8 @@ class Closing:
         for k in np.flatnonzero(wanted.active.max(axis=1) > 0):
             missing = wanted.active[k, :, None] * (wanted.gap[k] - self.margins.gap(self.rest + motion[k]))
             counts = _beyond(missing)
+            if counts.max() < _NOTHING:
+                continue
             missing = missing * counts[:, None]
             share = wanted.upper_share[k]
             self._move(motion[k], self.field.steps(share * missing, (share - 1.0) * missing))

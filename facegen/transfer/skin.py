@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -125,7 +125,7 @@ class Skin:
         sides, feet = self.sides, self.feet
         places, matrix = self._landmark_motion()
         if len(surface.faces) < _FINE_ENOUGH:
-            fine, fine_registered, made_of = refine(surface, registered, lambda a, b: self._bend(motion, a, b))
+            fine, fine_registered, made_of = refine(surface, registered, partial(self._bend, motion))
             if len(fine.vertices) > len(surface.vertices):
                 surface, registered, sides = fine, fine_registered, made_of @ sides
                 feet = self.correspondence(registered, vertex_normals(registered, surface.faces), sides, reach=_REACH)
@@ -136,15 +136,14 @@ class Skin:
         matrices, turns = spread(self.parts, template.landmarks, registered)
         return Transfer(surface, template.surface, feet, middles, matrices, turns, places, matrix, weights)
 
-    def _bend(self, motion: NDArray, a: NDArray, b: NDArray) -> NDArray[np.float64]:
-        """Return how far the motion of the middles of sides a-b is from the mean of their ends', at most, mm."""
-        template = self.template.surface
-        ends_and_middle = self.correspondence.nearest(np.concatenate([a, b, (a + b) / 2]))
-        n = len(template.vertices)
-        weights = sparse.csr_array((ends_and_middle.weights.ravel(), template.faces[ends_and_middle.faces].ravel(),
-                                    np.arange(0, 9 * len(a) + 1, 3)), shape=(3 * len(a), n))
-        one, other, middle = weights[:len(a)], weights[len(a):2 * len(a)], weights[2 * len(a):]
-        difference = sparse.csr_array(middle - (one + other) * 0.5)
+    def _bend(self, motion: NDArray, places: NDArray, sides: NDArray) -> NDArray[np.float64]:
+        """Return how far the motion of the middles of sides (e, 2) between places is from the mean of their ends', at
+        most, mm."""
+        ends, local = np.unique(sides, return_inverse=True)
+        a, b = local.reshape(-1, 2).T
+        at_ends, at_middles = (self._weights(at) for at in (places[ends], places[sides].mean(axis=1)))
+        difference = sparse.csr_array(at_middles - (at_ends[a] + at_ends[b]) * 0.5)
+        n = len(self.template.surface.vertices)
         reach = np.sqrt((motion**2).sum(axis=2)).max(axis=0)            # no side bends more than this allows
         most = abs(difference) @ reach
         mobile = np.flatnonzero(most > BEND)
@@ -154,6 +153,12 @@ class Skin:
             length = np.sqrt((moved.reshape(len(mobile), -1, 3) ** 2).sum(axis=2))
             most[mobile] = np.maximum(most[mobile], length.max(axis=1))
         return most
+
+    def _weights(self, places: NDArray) -> sparse.csr_array:
+        """Return the weights (p, n_s) of the template's vertices at what is nearest to places (p, 3)."""
+        template, feet = self.template.surface, self.correspondence.nearest(places)
+        return sparse.csr_array((feet.weights.ravel(), template.faces[feet.faces].ravel(),
+                                 np.arange(0, 3 * len(places) + 1, 3)), shape=(len(places), len(template.vertices)))
 
 
 def lay_skin(template: Template, surface: Surface, places: Mapping[str, tuple[NDArray, NDArray]], *,

@@ -84,12 +84,9 @@ def transfer(mesh: Mesh, landmarks: Landmarks, template: Template, *, method: st
         motion = moved.move(motion, jaw, template.gaze)
         motion, contacts = keep_apart(moved, motion, template.gaze)
         _on_skin(motion, rows, [slit.seal for slit in slits])
-    result = motion.copy()
-    for row, other in enumerate(template.minus):
-        if other >= 0:
-            result[row] -= motion[other]
-    back = frame.inverse()
-    shapes = {name: back.apply_vectors(result[row][own]) for row, name in enumerate(template.names)}
+    back, shapes = frame.inverse(), {}
+    for name, moved, other in zip(template.names, motion, template.minus, strict=True):
+        shapes[name] = back.apply_vectors(moved if other < 0 else moved - motion[other])[own]
     return Transferred(shapes, frame, skin, found, contacts)
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from facegen.fileio.kept import VARIABLE, Kept, content_key, kept_in
@@ -41,6 +41,7 @@ def test_no_numbers_are_kept_too(kept):
     assert kept.find(KEY, (0, 3)).shape == (0, 3)
 
 
+@settings(deadline=None)
 @given(data=st.data())
 def test_a_file_with_any_byte_changed_or_missing_is_none(tmp_path_factory, data):
     kept = Kept(tmp_path_factory.mktemp("kept"))

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.optimize import minimize
 
@@ -19,6 +19,7 @@ def skin():
     return Surface(mesh.vertices, mesh.faces[mesh.face_parts == 0])
 
 
+@settings(deadline=None)
 @given(st.lists(st.floats(-4, 4), min_size=3, max_size=3))
 def test_the_foot_on_one_triangle_is_the_minimum(point):
     feet = ClosestPoints(SINGLE)(np.array([point]))
