@@ -7,7 +7,7 @@ pieces as what they are, and back.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -72,30 +72,32 @@ def transfer(mesh: Mesh, landmarks: Landmarks, template: Template, *, method: st
     rows, surface = _skin_surface(vertices, faces, found)
     skin = lay_skin(template, surface, _skin_places(landmarks, own, rows, surface, places, template), opening=opening,
                     kept=kept)
-    motion = np.zeros((len(template.names), len(vertices), 3))
-    motion[:, rows] = skin.motion(method, weights)
+    on_skin = skin.motion(method, weights)
     contacts: Mapping[str, Contact] = {}
-    if method == "landmarks":
+    if method != "landmarks":
+        motion = _among_all(on_skin, rows, len(vertices))
+    else:
         moved = PieceMotion(found, vertices, faces, places)
         fronts = {f"eye_{s}": EyeFront(ball, vertices[moved.rows(f"eye_{s}")]) for s, ball in moved.eyes.items()}
         slits = [slit for slit in (closing(skin, slit, fronts.get(slit.name)) for slit in (*LIDS, LIPS)) if slit]
-        _on_skin(motion, rows, [slit.close for slit in slits])
+        for slit in slits:
+            slit.close(on_skin)
         jaw = None if skin.jaw is None else RigidMotions.of(lambda at: skin.jaw.movement(at, template.jaw))
-        motion = moved.move(motion, jaw, template.gaze)
+        motion = moved.move(_among_all(on_skin, rows, len(vertices)), jaw, template.gaze)
         motion, contacts = keep_apart(moved, motion, template.gaze)
-        _on_skin(motion, rows, [slit.seal for slit in slits])
+        for slit in slits:
+            slit.seal(motion, rows)
     back, shapes = frame.inverse(), {}
-    for name, moved, other in zip(template.names, motion, template.minus, strict=True):
-        shapes[name] = back.apply_vectors(moved if other < 0 else moved - motion[other])[own]
+    for name, shape, other in zip(template.names, motion, template.minus, strict=True):
+        shapes[name] = back.apply_vectors(shape if other < 0 else shape - motion[other])[own]
     return Transferred(shapes, frame, skin, found, contacts)
 
 
-def _on_skin(motion: NDArray, rows: NDArray, steps: Sequence[Callable[[NDArray], None]]) -> None:
-    """Apply steps that change the skin's displacements (k, rows, 3) in place."""
-    skin = motion[:, rows]
-    for step in steps:
-        step(skin)
-    motion[:, rows] = skin
+def _among_all(on_skin: NDArray, rows: NDArray, n: int) -> NDArray[np.float64]:
+    """Return the displacements (k, n, 3) of all vertices, where those in ``rows`` are the skin's."""
+    motion = np.zeros((len(on_skin), n, 3))
+    motion[:, rows] = on_skin
+    return motion
 
 
 def _skin_surface(vertices: NDArray, faces: NDArray, pieces: tuple[Piece, ...]) -> tuple[NDArray, Surface]:
