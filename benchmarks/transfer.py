@@ -31,7 +31,7 @@ SOLVERS = ("scipy", "qdldl")
 # What the tool is held to: seconds of the whole, of registration and of shapes, and MiB, at 25,000 triangles; seconds
 # of the whole at 100,000.
 GOALS = {25_000: (6.0, 2.0, 3.0, 600), 100_000: (30.0, None, None, None)}
-_PACKAGES = ("numpy", "scipy", "qdldl", "trimesh", "pycpd")
+_PACKAGES = ("numpy", "scipy", "qdldl", "trimesh")
 
 
 def run(arguments: list[str], bound: float) -> dict[str, object] | str:
@@ -133,8 +133,7 @@ def page(measured: dict[int, dict], peers: dict[int, dict], command: str, load: 
         "after the registration: solve, lids, lips, pieces. *Whole process* begins with the start of Python.",
         our_table(measured), *(["\n".join(lines)] if (lines := verdicts(measured)) else []),
         "## Beside public tools",
-        "Registration: trimesh's two (the same skin, template and landmarks, default settings), and coherent point "
-        "drift of pycpd on the bare vertices, whose cost is cubic, at the smallest size alone. Shapes: no public tool "
+        "Registration: trimesh's two (the same skin, template and landmarks, default settings). Shapes: no public tool "
         "that installs from PyPI makes them, so *Sumner, a solve for each shape* is a plain re-implementation of what "
         "public scripts do - the normal equations of Sumner and Popović (2004) with a fourth vertex for each triangle, "
         f"given to `scipy.sparse.linalg.spsolve` anew for each shape - of which {parts.SOLVED} shapes were timed and "
@@ -146,27 +145,34 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--quick", action="store_true", help="small sizes, one round")
     parser.add_argument("--rounds", type=int, default=3, help="of facegen's own figures")
-    parser.add_argument("--bound", type=float, default=150.0, help="CPU seconds after which a peer is ended")
+    parser.add_argument("--bound", type=float, default=100.0, help="CPU seconds after which a peer is ended")
     parser.add_argument("-o", "--output", type=Path, help="page to write; printed without")
     options = parser.parse_args()
     sizes, rounds = (QUICK, 1) if options.quick else (SIZES, options.rounds)
     load = os.getloadavg()[0] if hasattr(os, "getloadavg") else float("nan")
+    command = "python benchmarks/transfer.py" + (" --quick" if options.quick else f" --rounds {rounds}")
     measured: dict[int, dict] = {}
     peers: dict[int, dict] = {}
+
+    def write() -> str:
+        text = page(measured, peers, command, load)
+        if options.output:                          # after every step: a run may be stopped
+            options.output.write_text(text, encoding="utf-8")
+        return text
+
     with tempfile.TemporaryDirectory() as folder:
-        for size in sizes:
+        avatars = {size: decimated_human(Path(folder), size) for size in sizes}
+        for size, avatar in avatars.items():
             print(f"{size} triangles", file=sys.stderr, flush=True)
-            avatar = decimated_human(Path(folder), size)
             measured[size] = ours(avatar, Path(folder), rounds)
-            if size <= QUICK[-1]:
-                peers[size] = {name: run([name, str(avatar)], options.bound) for name in parts.PEERS
-                               if size == sizes[0] or name not in parts.CUBIC}
-    command = "python benchmarks/transfer.py" + (" --quick" if options.quick else f" --rounds {rounds}")
-    text = page(measured, peers, command, load)
-    if options.output:
-        options.output.write_text(text, encoding="utf-8")
-    else:
-        print(text)
+            write()
+        for size in QUICK:
+            for name in parts.PEERS:
+                print(f"{size} triangles, {name}", file=sys.stderr, flush=True)
+                peers.setdefault(size, {})[name] = run([name, str(avatars[size])], options.bound)
+                write()
+    if not options.output:
+        print(write())
 
 
 if __name__ == "__main__":

@@ -19,8 +19,7 @@ import numpy as np
 
 # Shapes that the plain reference solves; the others are extrapolated.
 SOLVED = 2
-REGISTRATIONS = ("trimesh nricp_sumner", "trimesh nricp_amberg", "pycpd deformable")
-CUBIC = ("pycpd deformable",)
+REGISTRATIONS = ("trimesh nricp_sumner", "trimesh nricp_amberg")
 PEERS = (*REGISTRATIONS, "Sumner, a solve for each shape")
 
 
@@ -112,10 +111,6 @@ def prepared(name: str, skin) -> Callable[[], object]:
     marks = [mark for mark in skin.places if mark in skin.template.landmarks]
     at = np.array([skin.places[mark][0][np.argmax(skin.places[mark][1])] for mark in marks])
     goals = np.array([skin.template.landmarks[mark] for mark in marks])
-    if name == "pycpd deformable":
-        from pycpd import DeformableRegistration
-
-        return DeformableRegistration(X=template.vertices[np.unique(template.faces)], Y=surface.vertices).register
     import trimesh
     from trimesh import registration
 
