@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache, lru_cache
 from pathlib import Path
@@ -17,6 +17,7 @@ from facegen.fileio.avatar import AvatarFile, check_output, load_avatar, save_av
 from facegen.transfer.landmarks import check_places, load_landmarks
 from facegen.transfer.pieces import describe
 from facegen.transfer.template import Template, template_of
+from facegen.transfer.template_file import read_template
 from facegen.transfer.transfer import Transferred, transfer
 
 DEFAULT_SETS = ("units", "arkit", "visemes")
@@ -49,15 +50,18 @@ def avatar_names() -> tuple[str, ...]:
 
 
 def rig(avatar: str | Path, output: str | Path, *, landmarks: str | Path | None = None,
-        sets: Sequence[str] = DEFAULT_SETS, person: str | Path | None = None, method: str = "landmarks",
+        sets: Sequence[str] | None = None, shapes: Sequence[str] | None = None, person: str | Path | None = None,
+        template: str | Path | None = None, template_landmarks: str | Path | None = None, method: str = "landmarks",
         opening: float = 1.0, pieces: Mapping[str, str] | None = None, normals: bool = True,
         quantise: bool = False) -> Rigged:
     """Give an avatar blendshapes and write it.
 
     avatar: the path of a .obj, .glb, .gltf, .vrm, .ply or .stl file, or a shipped avatar's name. output: .glb (or
     .gltf, .vrm), .npz, or a folder for a sequence of OBJ files. landmarks: their file; a shipped avatar has its own.
-    sets: vocabularies, see `shape_sets`. person: whose habits override expressions. method, opening, pieces: as in
-    `transfer`. normals, quantise: as in `save_avatar`. Raises InputError and its children; nothing is written then. ::
+    sets: vocabularies, see `shape_sets`; `DEFAULT_SETS` without. shapes: only those of these names. person: whose
+    habits override expressions. template, template_landmarks: another face that has shapes, instead of facegen's own
+    and its sets, see `read_template`. method, opening, pieces: as in `transfer`. normals, quantise: as in
+    `save_avatar`. Raises InputError and its children; nothing is written then. ::
 
         facegen.rig("cat.obj", "cat.glb", landmarks="cat.yaml")
         facegen.load_face("cat.glb").pose("happiness")
@@ -71,19 +75,52 @@ def rig(avatar: str | Path, output: str | Path, *, landmarks: str | Path | None 
     if marks is None:
         raise InputError(f"landmarks: expected the file of the avatar's landmarks, got none; write one with the places "
                          f"of eyes, brows, nose, mouth and chin on {path.name} (docs/landmarks.md lists the names)")
-    recipes = shape_sets(sets, person)
+    asked = _asked(sets, shapes, person, template, template_landmarks)
     source = load_avatar(path)
-    check_output(source, output, recipes)
+    check_output(source, output, asked.sets)
     places = load_landmarks(marks, source.mesh, mesh_name=path.name, digest=source.digest)
     warnings = tuple(check_places(places, source.mesh))
-    template = _template(tuple(recipes.items()))
-    found = transfer(source.mesh, places, template, method=method, opening=opening, pieces=pieces)
-    shapes = {name: found.shapes[name] for name in recipes}
-    expressions = {name: {name: 1.0} for name, recipe in recipes.items() if recipe.set == "vrm"}
-    notes = _notes(source, places.points(source.mesh.vertices), found, recipes)
-    written = save_avatar(source, output, shapes, notes=notes, normals=normals, quantise=quantise,
+    found = transfer(source.mesh, places, asked.template(), method=method, opening=opening, pieces=pieces)
+    made = {name: found.shapes[name] for name in asked.sets}
+    expressions = {name: {name: 1.0} for name, kind in asked.sets.items() if kind == "vrm"}
+    notes = _notes(source, places.points(source.mesh.vertices), found, asked.sets)
+    written = save_avatar(source, output, made, notes=notes, normals=normals, quantise=quantise,
                           expressions=expressions if _is_vrm(source) else {})
-    return Rigged(written, tuple(shapes), warnings, found)
+    return Rigged(written, tuple(made), warnings, found)
+
+
+@dataclass(frozen=True)
+class _Asked:
+    """What is to be made. ``sets``: shape -> the vocabulary it belongs to, empty if unknown; ``template``: makes it."""
+
+    sets: Mapping[str, str]
+    template: Callable[[], Template]
+
+
+def _asked(sets: Sequence[str] | None, shapes: Sequence[str] | None, person: str | Path | None,
+           template: str | Path | None, template_landmarks: str | Path | None) -> _Asked:
+    """Return the shapes to make and the template to make them from, checked: facegen's own face, or a file."""
+    if template is not None:
+        if sets is not None or person is not None:
+            raise InputError(f"{'person' if sets is None else 'sets'}: facegen's own shapes cannot be had from another "
+                             "template, whose shapes go by its own names; leave it out, and choose among them by name "
+                             "(shapes)")
+        file = read_template(template, landmarks=template_landmarks, shapes=shapes)
+        return _Asked({name: file.sets.get(name, "") for name in file.shapes}, file.template)
+    if template_landmarks is not None:
+        raise InputError("template_landmarks: expected a template that they are on, got none (--template)")
+    recipes = shape_sets(DEFAULT_SETS if sets is None else sets, person)
+    wanted = list(recipes) if shapes is None else list(dict.fromkeys(shapes))
+    if not wanted:
+        raise InputError("shapes: expected one or more names, got none")
+    for name in wanted:
+        if name not in recipes:
+            raise InputError(f"shapes: '{name}' is not in the sets that were asked for{nearest(str(name), recipes)} "
+                             "(facegen list shapes)")
+    # A corrective is made from the shape that it corrects, whether or not that is asked for.
+    needed = {*wanted, *(recipes[name].minus for name in wanted)}
+    of = tuple((name, recipe) for name, recipe in recipes.items() if name in needed)
+    return _Asked({name: recipes[name].set for name in wanted}, lambda: _template(of))
 
 
 @lru_cache(maxsize=1)         # many avatars with the same shapes; a template is tens of megabytes
@@ -96,7 +133,7 @@ def _is_vrm(source: AvatarFile) -> bool:
 
 
 def _notes(source: AvatarFile, points: Mapping[str, np.ndarray], found: Transferred,
-           recipes: Mapping[str, Recipe]) -> dict[str, object]:
+           sets: Mapping[str, str]) -> dict[str, object]:
     """Return what facegen keeps in the file, to load it as a face: see facegen.face.avatar_notes."""
     kinds: dict[str, str] = {}
     for piece in found.pieces:
@@ -109,7 +146,7 @@ def _notes(source: AvatarFile, points: Mapping[str, np.ndarray], found: Transfer
         "frame": {"scale": frame.scale, "rotation": frame.rotation.tolist(), "offset": frame.offset.tolist()},
         "landmarks": {name: at.tolist() for name, at in points.items()},
         **({"neck": points["neck"].tolist()} if "neck" in points else {}),
-        "sets": sorted({recipe.set for recipe in recipes.values()}),
-        "shapes": {name: {"set": recipe.set} for name, recipe in recipes.items()},
+        "sets": sorted(set(sets.values()) - {""}),
+        "shapes": {name: {"set": kind} if kind else {} for name, kind in sets.items()},
         "pieces": kinds,
     }

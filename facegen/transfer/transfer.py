@@ -14,10 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from facegen.errors import InputError, nearest
-from facegen.geometry.closest import ClosestPoints
 from facegen.geometry.mesh import Mesh
-from facegen.geometry.operators import Surface
 from facegen.transfer.alignment import Similarity, align
+from facegen.transfer.apart import take_apart
 from facegen.transfer.baselines import PaperWeights
 from facegen.transfer.closing import closing
 from facegen.transfer.eyeball import EyeFront
@@ -25,11 +24,10 @@ from facegen.transfer.keep_apart import Contact, keep_apart
 from facegen.transfer.landmarks import Landmarks
 from facegen.transfer.margins import LIDS, LIPS
 from facegen.transfer.piece_motion import PieceMotion, RigidMotions
-from facegen.transfer.pieces import Piece, face_names, find_pieces
+from facegen.transfer.pieces import Piece
 from facegen.transfer.skin import METHODS, Skin, lay_skin
 from facegen.transfer.solve import Weights
 from facegen.transfer.template import Template
-from facegen.transfer.weld import weld
 
 # The jaw of an avatar opens between these shares of what is estimated; more is a mistake.
 _LEAST_OPENING, _MOST_OPENING = 0.1, 3.0
@@ -63,20 +61,17 @@ def transfer(mesh: Mesh, landmarks: Landmarks, template: Template, *, method: st
     if not _LEAST_OPENING <= opening <= _MOST_OPENING:
         raise InputError(f"opening: expected a factor of {_LEAST_OPENING} to {_MOST_OPENING}, got {opening!r}")
     frame = align(landmarks.points(mesh.vertices), template.landmarks)
-    turned = frame.apply(mesh.vertices)
-    places = landmarks.points(turned)
-    vertices, own = weld(turned, mesh.faces)
-    faces = own[mesh.faces]
-    found = find_pieces(vertices, faces, places, names=face_names(mesh), explicit=pieces)
-    rows, surface = _skin_surface(vertices, faces, found)
-    skin = lay_skin(template, surface, _skin_places(landmarks, own, rows, surface, places, template), opening=opening)
+    parts = take_apart(mesh, landmarks, frame, explicit=pieces)
+    vertices, found, rows = parts.vertices, parts.pieces, parts.rows
+    skin = lay_skin(template, parts.surface, parts.places(template.places), opening=opening)
     motion = np.zeros((len(template.names), len(vertices), 3))
     motion[:, rows] = skin.motion(method, weights)
     contacts: Mapping[str, Contact] = {}
     if method == "landmarks":
-        moved = PieceMotion(found, vertices, faces, places)
+        moved = PieceMotion(found, vertices, parts.faces, parts.points)
         fronts = {f"eye_{s}": EyeFront(ball, vertices[moved.rows(f"eye_{s}")]) for s, ball in moved.eyes.items()}
         slits = [slit for slit in (closing(skin, slit, fronts.get(slit.name)) for slit in (*LIDS, LIPS)) if slit]
+        slits = [] if skin.copied else slits        # a copy closes as the template does: there is nothing to mend
         _on_skin(motion, rows, [slit.close for slit in slits])
         jaw = None if skin.jaw is None else RigidMotions.of(lambda at: skin.jaw.movement(at, template.jaw))
         motion = moved.move(motion, jaw, template.gaze)
@@ -87,7 +82,7 @@ def transfer(mesh: Mesh, landmarks: Landmarks, template: Template, *, method: st
         if other >= 0:
             result[row] -= motion[other]
     back = frame.inverse()
-    shapes = {name: back.apply_vectors(result[row][own]) for row, name in enumerate(template.names)}
+    shapes = {name: back.apply_vectors(result[row][parts.own]) for row, name in enumerate(template.names)}
     return Transferred(shapes, frame, skin, found, contacts)
 
 
@@ -97,33 +92,3 @@ def _on_skin(motion: NDArray, rows: NDArray, steps: Sequence[Callable[[NDArray],
     for step in steps:
         step(skin)
     motion[:, rows] = skin
-
-
-def _skin_surface(vertices: NDArray, faces: NDArray, pieces: tuple[Piece, ...]) -> tuple[NDArray, Surface]:
-    """Return the skin's vertices (n,) among all, and its surface over them."""
-    triangles = faces[np.concatenate([piece.faces for piece in pieces if piece.kind == "skin"])]
-    flat = (triangles == np.roll(triangles, 1, axis=1)).any(axis=1)         # what welding made lines of
-    rows, local = np.unique(triangles[~flat], return_inverse=True)
-    return rows, Surface(vertices[rows], local.reshape(-1, 3).astype(np.int32))
-
-
-def _skin_places(landmarks: Landmarks, own: NDArray, rows: NDArray, surface: Surface, places: Mapping[str, NDArray],
-                 template: Template) -> dict[str, tuple[NDArray, NDArray]]:
-    """Return the landmarks as vertices of the skin and weights: their own triangle where that is skin, else the nearest
-    place (brows are often pieces of their own)."""
-    local = np.full(own.max() + 1, -1)
-    local[rows] = np.arange(len(rows))
-    result, elsewhere = {}, []
-    for name, corners, weights in zip(landmarks.names, landmarks.corners, landmarks.barycentric, strict=True):
-        if name not in template.places:
-            continue
-        here = local[own[corners]]
-        if (here[weights > 0] >= 0).all():
-            result[name] = (np.maximum(here, 0), weights)
-        else:
-            elsewhere.append(name)
-    if elsewhere:
-        feet = ClosestPoints(surface)(np.array([places[name] for name in elsewhere]))
-        result |= {name: (surface.faces[face], weights)
-                   for name, face, weights in zip(elsewhere, feet.faces, feet.weights, strict=True)}
-    return result
