@@ -26,6 +26,9 @@ OtherTemplate = Annotated[Path | None, typer.Option(
 OtherMarks = Annotated[Path | None, typer.Option(
     "--template-landmarks", metavar="FILE", help="Its landmarks; what facegen rigged has them in the file.")]
 Method = Annotated[str, typer.Option("--method", metavar="NAME", help="landmarks, or to compare: sumner, cloning.")]
+EnergyWeights = Annotated[str | None, typer.Option(
+    "--weights", metavar="WEIGHTS",
+    help="Of the energies: ours, paper, a .yaml file, or by name, such as landmarks=20,anchor=0.03. [default: ours]")]
 Opening = Annotated[float, typer.Option("--opening", metavar="FACTOR", help="How far the jaw opens, of the estimate.")]
 Pieces = Annotated[list[str] | None, typer.Option(
     "--piece", metavar="PART=KIND", help="What a part is (skin, eye_L, teeth_upper, skull, carried ...); repeatable.")]
@@ -35,7 +38,7 @@ Quantise = Annotated[bool, typer.Option("--quantise", help="Two bytes a number i
 
 def rig(avatar: Avatar, output: Out = None, landmarks: Marks = None, sets: Sets = None, shapes: Shapes = None,
         person: PersonName = None, template: OtherTemplate = None, template_landmarks: OtherMarks = None,
-        method: Method = "landmarks", opening: Opening = 1.0, piece: Pieces = None,
+        method: Method = "landmarks", weights: EnergyWeights = None, opening: Opening = 1.0, piece: Pieces = None,
         no_normals: NoNormals = False, quantise: Quantise = False, json: Json = False, quiet: Quiet = False) -> None:
     """Give an avatar the expressions as blendshapes.
 
@@ -53,8 +56,8 @@ def rig(avatar: Avatar, output: Out = None, landmarks: Marks = None, sets: Sets 
     from facegen.transfer.rig import rig as make
 
     made = make(avatar, output, landmarks=landmarks, sets=_listed(sets), shapes=_listed(shapes), person=person,
-                template=template, template_landmarks=template_landmarks, method=method, opening=opening, pieces=given,
-                normals=not no_normals, quantise=quantise)
+                template=template, template_landmarks=template_landmarks, method=method, weights=weights,
+                opening=opening, pieces=given, normals=not no_normals, quantise=quantise)
     if not quiet:
         warn(made.warnings)
     if json:

@@ -5,8 +5,8 @@ template's. ES is smoothness, EI keeps the shape, EC draws every vertex to the n
 of the displacement u = x - x0 and its gradient in the triangles' planes, T - I = grad u:
 
     ES = integral |second derivative of u|^2     (eq. 10, as the jumps of grad u across edges)
-    EI = integral |grad u|^2                     (eq. 12)
-    EC = integral |x - c(x)|^2                   (eq. 13)
+    EI = integral |grad u|^2                     (eq. 11)
+    EC = integral |x - c(x)|^2                   (eq. 12)
 
 Integrals over the surface, not sums over its triangles: a finer mesh of the same face is registered alike. Where we
 differ from the paper: c(x) lies on the surface, not at a vertex; more and gentler steps; no partner across a slit or

@@ -19,6 +19,7 @@ from facegen.transfer.pieces import describe
 from facegen.transfer.template import Template, template_of
 from facegen.transfer.template_file import read_template
 from facegen.transfer.transfer import Transferred, transfer
+from facegen.transfer.weights import WeightsLike, read_weights
 
 DEFAULT_SETS = ("units", "arkit", "visemes")
 """What an avatar gets unless told otherwise: the units make every expression, the others are what programs ask for."""
@@ -52,16 +53,16 @@ def avatar_names() -> tuple[str, ...]:
 def rig(avatar: str | Path, output: str | Path, *, landmarks: str | Path | None = None,
         sets: Sequence[str] | None = None, shapes: Sequence[str] | None = None, person: str | Path | None = None,
         template: str | Path | None = None, template_landmarks: str | Path | None = None, method: str = "landmarks",
-        opening: float = 1.0, pieces: Mapping[str, str] | None = None, normals: bool = True,
-        quantise: bool = False) -> Rigged:
+        weights: WeightsLike | None = None, opening: float = 1.0, pieces: Mapping[str, str] | None = None,
+        normals: bool = True, quantise: bool = False) -> Rigged:
     """Give an avatar blendshapes and write it.
 
     avatar: the path of a .obj, .glb, .gltf, .vrm, .ply or .stl file, or a shipped avatar's name. output: .glb (or
     .gltf, .vrm), .npz, or a folder for a sequence of OBJ files. landmarks: their file; a shipped avatar has its own.
     sets: vocabularies, see `shape_sets`; `DEFAULT_SETS` without. shapes: only those of these names. person: whose
     habits override expressions. template, template_landmarks: another face that has shapes, instead of facegen's own
-    and its sets, see `read_template`. method, opening, pieces: as in `transfer`. normals, quantise: as in
-    `save_avatar`. Raises InputError and its children; nothing is written then. ::
+    and its sets, see `read_template`. method, opening, pieces: as in `transfer`; weights: as `read_weights`
+    takes them. normals, quantise: as in `save_avatar`. Raises InputError and its children; nothing is written then. ::
 
         facegen.rig("cat.obj", "cat.glb", landmarks="cat.yaml")
         facegen.load_face("cat.glb").pose("happiness")
@@ -76,11 +77,13 @@ def rig(avatar: str | Path, output: str | Path, *, landmarks: str | Path | None 
         raise InputError(f"landmarks: expected the file of the avatar's landmarks, got none; write one with the places "
                          f"of eyes, brows, nose, mouth and chin on {path.name} (docs/landmarks.md lists the names)")
     asked = _asked(sets, shapes, person, template, template_landmarks)
+    chosen = read_weights(weights)
     source = load_avatar(path)
     check_output(source, output, asked.sets)
     places = load_landmarks(marks, source.mesh, mesh_name=path.name, digest=source.digest)
     warnings = tuple(check_places(places, source.mesh))
-    found = transfer(source.mesh, places, asked.template(), method=method, opening=opening, pieces=pieces)
+    found = transfer(source.mesh, places, asked.template(), method=method, weights=chosen, opening=opening,
+                     pieces=pieces)
     made = {name: found.shapes[name] for name in asked.sets}
     expressions = {name: {name: 1.0} for name, kind in asked.sets.items() if kind == "vrm"}
     notes = _notes(source, places.points(source.mesh.vertices), found, asked.sets)

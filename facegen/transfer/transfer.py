@@ -17,7 +17,6 @@ from facegen.errors import InputError, nearest
 from facegen.geometry.mesh import Mesh
 from facegen.transfer.alignment import Similarity, align
 from facegen.transfer.apart import take_apart
-from facegen.transfer.baselines import PaperWeights
 from facegen.transfer.closing import closing
 from facegen.transfer.eyeball import EyeFront
 from facegen.transfer.keep_apart import Contact, keep_apart
@@ -26,8 +25,8 @@ from facegen.transfer.margins import LIDS, LIPS
 from facegen.transfer.piece_motion import PieceMotion, RigidMotions
 from facegen.transfer.pieces import Piece
 from facegen.transfer.skin import METHODS, Skin, lay_skin
-from facegen.transfer.solve import Weights
 from facegen.transfer.template import Template
+from facegen.transfer.weights import AnyWeights
 
 # The jaw of an avatar opens between these shares of what is estimated; more is a mistake.
 _LEAST_OPENING, _MOST_OPENING = 0.1, 3.0
@@ -47,17 +46,19 @@ class Transferred:
 
 
 def transfer(mesh: Mesh, landmarks: Landmarks, template: Template, *, method: str = "landmarks",
-             weights: Weights | PaperWeights | None = None, opening: float = 1.0,
+             weights: AnyWeights | None = None, opening: float = 1.0,
              pieces: Mapping[str, str] | None = None) -> Transferred:
     """Return the template's shapes on an avatar.
 
     mesh: the avatar, in any axes and units. landmarks: on it. method: "landmarks" (ours), or a published one to compare
-    with: "sumner", "cloning". weights: of the energies; `PAPER` holds the paper's. opening: a factor on how far the jaw
-    opens. pieces: part, material or number of a component -> kind. Raises InputError for what cannot be used: unknown
-    names, a mesh that cannot be solved.
+    with: "sumner", "cloning". weights: of the energies, see `read_weights`; ours without. opening: a factor on how
+    far the jaw opens. pieces: part, material or number of a component -> kind. Raises InputError for what cannot be
+    used: unknown names, a mesh that cannot be solved.
     """
     if method not in METHODS:
         raise InputError(f"method: expected {', '.join(METHODS)}, got {method!r}{nearest(str(method), METHODS)}")
+    if weights is not None and method != "landmarks":
+        raise InputError(f"weights: the method '{method}' has none to choose; leave them out, or the method")
     if not _LEAST_OPENING <= opening <= _MOST_OPENING:
         raise InputError(f"opening: expected a factor of {_LEAST_OPENING} to {_MOST_OPENING}, got {opening!r}")
     frame = align(landmarks.points(mesh.vertices), template.landmarks)
