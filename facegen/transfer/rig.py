@@ -81,15 +81,15 @@ def rig(avatar: str | Path, output: str | Path, *, landmarks: str | Path | None 
     source = load_avatar(path)
     check_output(source, output, asked.sets)
     places = load_landmarks(marks, source.mesh, mesh_name=path.name, digest=source.digest)
-    warnings = tuple(check_places(places, source.mesh))
+    warnings = [*check_places(places, source.mesh), *_without_expressions(source, asked.sets)]
     found = transfer(source.mesh, places, asked.template(), method=method, weights=chosen, opening=opening,
                      pieces=pieces)
     made = {name: found.shapes[name] for name in asked.sets}
     expressions = {name: {name: 1.0} for name, kind in asked.sets.items() if kind == "vrm"}
     notes = _notes(source, places.points(source.mesh.vertices), found, asked.sets)
     written = save_avatar(source, output, made, notes=notes, normals=normals, quantise=quantise,
-                          expressions=expressions if _is_vrm(source) else {})
-    return Rigged(written, tuple(made), warnings, found)
+                          expressions=expressions)
+    return Rigged(written, tuple(made), tuple(warnings), found)
 
 
 @dataclass(frozen=True)
@@ -131,8 +131,12 @@ def _template(recipes: tuple[tuple[str, Recipe], ...]) -> Template:
     return template_of(load_face(), dict(recipes))
 
 
-def _is_vrm(source: AvatarFile) -> bool:
-    return source.path.suffix.lower() == ".vrm"
+def _without_expressions(source: AvatarFile, sets: Mapping[str, str]) -> list[str]:
+    """Return a warning if presets of VRM go into a file that cannot bind them."""
+    if source.is_vrm0 and "vrm" in sets.values():
+        return [f"{source.path.name} is a VRM 0.x avatar: it gets the shapes but no expressions that use them; convert "
+                "it to VRM 1.0 first"]
+    return []
 
 
 def _notes(source: AvatarFile, points: Mapping[str, np.ndarray], found: Transferred,

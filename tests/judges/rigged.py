@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import base64
+import io
 import os
 import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
+from PIL import Image
 
 from facegen.fileio.avatar import AvatarFile, load_avatar, save_avatar
 from facegen.geometry.mesh import Mesh, merge
@@ -21,6 +24,11 @@ def missing(what: str) -> None:
     if os.environ.get("FACEGEN_CI"):
         pytest.fail(f"{what}: must be installed where FACEGEN_CI is set")
     pytest.skip(what)
+
+
+def picture(uri: str) -> np.ndarray:
+    """Return a picture (h, w, 3) from its data: URI."""
+    return np.asarray(Image.open(io.BytesIO(base64.b64decode(uri.partition(",")[2]))).convert("RGB")).astype(float)
 
 
 def bumps(vertices: np.ndarray, count: int = 6, seed: int = 1) -> dict[str, np.ndarray]:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import base64
-import io
 import os
 
 import gltfs
@@ -11,7 +9,7 @@ import numpy as np
 import pytest
 from browser import chromium, seen_by_threejs
 from PIL import Image
-from rigged import missing, written
+from rigged import missing, picture, written
 
 
 @pytest.fixture
@@ -20,10 +18,6 @@ def see(judges, tmp_path):
     if chromium() is None:
         missing("Chromium is not installed")
     return lambda path, poses: seen_by_threejs(judges, path, poses, tmp_path / "profile")
-
-
-def picture(uri):
-    return np.asarray(Image.open(io.BytesIO(base64.b64decode(uri.partition(",")[2]))).convert("RGB")).astype(float)
 
 
 def nearest_rows(points, of):
