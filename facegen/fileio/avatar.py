@@ -58,7 +58,7 @@ class AvatarFile:
     @property
     def is_vrm0(self) -> bool:
         """Whether it is a VRM 0.x avatar: those look to -z, and their expressions are none that facegen writes."""
-        return isinstance(self.source, GltfScene) and is_vrm0(self.source.file.json)
+        return is_vrm0(getattr(getattr(self.source, "file", None), "json", {}))
 
 
 def load_avatar(path: str | os.PathLike[str]) -> AvatarFile:
