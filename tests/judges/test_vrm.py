@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from browser import chromium, seen_by_threejs
 from rigged import missing, picture
+from test_threejs import keep
 from test_validator import complaints
 from vrm_avatars import bound, vrm_avatar
 
@@ -91,6 +92,7 @@ def test_three_vrm_shows_the_presets(rigged, judges, tmp_path):
         assert set(seen["expressions"][name]) <= {name}             # morph targets at work, by name
         assert all(weight == 1.0 for weight in seen["expressions"][name].values())
         assert seen["expressions"][name] or name == "neutral"
+    keep(seen, "vrm")
     neutral = picture(seen["pictures"][""])
     for name in set(PRESETS) - {"happy", "neutral"}:
         assert np.abs(picture(seen["pictures"][f"vrm:{name}"]) - neutral).max() > 30, name
