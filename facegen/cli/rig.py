@@ -32,6 +32,8 @@ EnergyWeights = Annotated[str | None, typer.Option(
 Opening = Annotated[float, typer.Option("--opening", metavar="FACTOR", help="How far the jaw opens, of the estimate.")]
 Pieces = Annotated[list[str] | None, typer.Option(
     "--piece", metavar="PART=KIND", help="What a part is (skin, eye_L, teeth_upper, skull, carried ...); repeatable.")]
+Preview = Annotated[Path | None, typer.Option(
+    "--preview", metavar="PICTURE", help="Also draw a sheet of what the shapes do: .png, .webp or .jpg.")]
 NoNormals = Annotated[bool, typer.Option("--no-normals", help="Leave out how normals change: half the size.")]
 Quantise = Annotated[bool, typer.Option("--quantise", help="Two bytes a number instead of four.")]
 
@@ -39,7 +41,8 @@ Quantise = Annotated[bool, typer.Option("--quantise", help="Two bytes a number i
 def rig(avatar: Avatar, output: Out = None, landmarks: Marks = None, sets: Sets = None, shapes: Shapes = None,
         person: PersonName = None, template: OtherTemplate = None, template_landmarks: OtherMarks = None,
         method: Method = "landmarks", weights: EnergyWeights = None, opening: Opening = 1.0, piece: Pieces = None,
-        no_normals: NoNormals = False, quantise: Quantise = False, json: Json = False, quiet: Quiet = False) -> None:
+        preview: Preview = None, no_normals: NoNormals = False, quantise: Quantise = False, json: Json = False,
+        quiet: Quiet = False) -> None:
     """Give an avatar the expressions as blendshapes.
 
     For example: facegen rig cat.obj --landmarks cat.yaml -o cat.glb
@@ -53,16 +56,16 @@ def rig(avatar: Avatar, output: Out = None, landmarks: Marks = None, sets: Sets 
         if not (part and equals and kind):
             raise InputError(f"--piece: expected PART=KIND such as hat=skull, got {entry!r}")
         given[part] = kind
-    from facegen.transfer.rig import rig as make
+    from facegen.jobs.rigging import rig as make
 
     made = make(avatar, output, landmarks=landmarks, sets=_listed(sets), shapes=_listed(shapes), person=person,
                 template=template, template_landmarks=template_landmarks, method=method, weights=weights,
-                opening=opening, pieces=given, normals=not no_normals, quantise=quantise)
+                opening=opening, pieces=given, preview=preview, normals=not no_normals, quantise=quantise)
     if not quiet:
         warn(made.warnings)
     if json:
         print_json({"file": str(made.path), "shapes": list(made.names), "warnings": list(made.warnings),
-                    "pieces": made.pieces})
+                    "preview": None if preview is None else str(preview), "pieces": made.pieces})
     elif not quiet:
         for row in made.pieces:
             print(f"{row['name']}: {row['kind']}, {row['triangles']} triangles ({row['why']})")

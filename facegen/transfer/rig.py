@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache, lru_cache
 from pathlib import Path
 
@@ -27,12 +27,14 @@ DEFAULT_SETS = ("units", "arkit", "visemes")
 
 @dataclass(frozen=True, eq=False)
 class Rigged:
-    """``path`` of the file written, ``names`` of its shapes, ``warnings``, and ``found``: how the transfer went."""
+    """``path`` of the file written, ``names`` of its shapes, ``warnings``, ``found``: how the transfer
+    went, and ``avatar``: what was written, as it is read again."""
 
     path: Path
     names: tuple[str, ...]
     warnings: tuple[str, ...]
     found: Transferred
+    avatar: AvatarFile
 
     @property
     def pieces(self) -> list[dict[str, object]]:
@@ -89,7 +91,8 @@ def rig(avatar: str | Path, output: str | Path, *, landmarks: str | Path | None 
     notes = _notes(source, places.points(source.mesh.vertices), found, asked.sets)
     written = save_avatar(source, output, made, notes=notes, normals=normals, quantise=quantise,
                           expressions=expressions)
-    return Rigged(written, tuple(made), tuple(warnings), found)
+    return Rigged(written, tuple(made), tuple(warnings), found,
+                  replace(source, shapes={**source.shapes, **made}, notes=notes))
 
 
 @dataclass(frozen=True)
