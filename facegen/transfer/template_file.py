@@ -131,12 +131,16 @@ def _template(file: TemplateFile) -> Template:
     corrects = {name: recipe.minus for name, recipe in shape_set("all").items()
                 if recipe.minus in file.avatar.shapes and name in file.shapes}
     names = tuple(dict.fromkeys([*file.shapes, *corrects.values()]))
-    motion = np.stack([frame.apply_vectors(file.avatar.shapes[name][first]) for name in names])
+    every = tuple(dict.fromkeys([*names, *file.avatar.shapes]))        # the jaw is known by the shape that opens it
+    motion = np.stack([frame.apply_vectors(file.avatar.shapes[name][first]) for name in every])
     minus = tuple(names.index(corrects[name]) if name in corrects else -1 for name in names)
     # A corrective is told as the pose that it leads to: lips that close over an open jaw do not go through each other.
-    motion += np.where(np.array(minus)[:, None, None] >= 0, motion[list(minus)], 0.0)
+    for row, other in enumerate(minus):
+        if other >= 0:
+            motion[row] += motion[other]
     pieces = PieceMotion(parts.pieces, parts.vertices, parts.faces, parts.points)
     hinge, jaw, share = measured_jaw(pieces, motion)
+    motion, jaw = motion[:len(names)], jaw[:len(names)]
     places = parts.places([name for name in landmarks.names if not name.startswith("eye_center")])
     places = settled(parts.surface, places, side_fields(parts.surface, places))
     points = {name: weights @ parts.surface.vertices[rows] for name, (rows, weights) in places.items()}

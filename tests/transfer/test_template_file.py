@@ -118,6 +118,13 @@ def test_a_corrective_alone_brings_what_it_corrects_along_but_does_not_write_it(
     assert list(load_avatar(out.path).shapes) == ["mouthClose"]
 
 
+def test_the_jaw_is_known_from_shapes_that_are_not_asked_for(cartoon, tmp_path):
+    cat = load_avatar(rig("cat", tmp_path / "a.glb", template=cartoon, shapes=["jawLeft"]).path)
+    lower, upper = (cat.shapes["jawLeft"][of_kind(cat, cat.notes, kind)] for kind in ("teeth_lower", "teeth_upper"))
+    assert lower[:, 0].min() > 0.005 * np.ptp(cat.mesh.vertices[:, 1])      # to the subject's left
+    assert not upper.any()
+
+
 @pytest.fixture(scope="module")
 def taken_apart():
     """The cartoon's pieces in the working frame."""
