@@ -36,13 +36,15 @@ Preview = Annotated[Path | None, typer.Option(
     "--preview", metavar="PICTURE", help="Also draw a sheet of what the shapes do: .png, .webp or .jpg.")]
 NoNormals = Annotated[bool, typer.Option("--no-normals", help="Leave out how normals change: half the size.")]
 Quantise = Annotated[bool, typer.Option("--quantise", help="Two bytes a number instead of four.")]
+NoCache = Annotated[bool, typer.Option(
+    "--no-cache", help="Lay the skin on the template anew, and do not keep that for the next time.")]
 
 
 def rig(avatar: Avatar, output: Out = None, landmarks: Marks = None, sets: Sets = None, shapes: Shapes = None,
         person: PersonName = None, template: OtherTemplate = None, template_landmarks: OtherMarks = None,
         method: Method = "landmarks", weights: EnergyWeights = None, opening: Opening = 1.0, piece: Pieces = None,
-        preview: Preview = None, no_normals: NoNormals = False, quantise: Quantise = False, json: Json = False,
-        quiet: Quiet = False) -> None:
+        preview: Preview = None, no_normals: NoNormals = False, quantise: Quantise = False, no_cache: NoCache = False,
+        json: Json = False, quiet: Quiet = False) -> None:
     """Give an avatar the expressions as blendshapes.
 
     For example: facegen rig cat.obj --landmarks cat.yaml -o cat.glb
@@ -60,7 +62,8 @@ def rig(avatar: Avatar, output: Out = None, landmarks: Marks = None, sets: Sets 
 
     made = make(avatar, output, landmarks=landmarks, sets=_listed(sets), shapes=_listed(shapes), person=person,
                 template=template, template_landmarks=template_landmarks, method=method, weights=weights,
-                opening=opening, pieces=given, preview=preview, normals=not no_normals, quantise=quantise)
+                opening=opening, pieces=given, preview=preview, normals=not no_normals, quantise=quantise,
+                cache=not no_cache)
     if not quiet:
         warn(made.warnings)
     if json:

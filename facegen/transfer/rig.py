@@ -14,6 +14,7 @@ from facegen.data import meshes_dir
 from facegen.errors import FileError, InputError, nearest
 from facegen.face.face import load_face
 from facegen.fileio.avatar import AvatarFile, check_output, load_avatar, save_avatar
+from facegen.fileio.kept import kept_in
 from facegen.transfer.landmarks import check_places, load_landmarks
 from facegen.transfer.pieces import describe
 from facegen.transfer.template import Template, template_of
@@ -56,7 +57,7 @@ def rig(avatar: str | Path, output: str | Path, *, landmarks: str | Path | None 
         sets: Sequence[str] | None = None, shapes: Sequence[str] | None = None, person: str | Path | None = None,
         template: str | Path | None = None, template_landmarks: str | Path | None = None, method: str = "landmarks",
         weights: WeightsLike | None = None, opening: float = 1.0, pieces: Mapping[str, str] | None = None,
-        normals: bool = True, quantise: bool = False) -> Rigged:
+        normals: bool = True, quantise: bool = False, cache: bool = True) -> Rigged:
     """Give an avatar blendshapes and write it.
 
     avatar: the path of a .obj, .glb, .gltf, .vrm, .ply or .stl file, or a shipped avatar's name. output: .glb (or
@@ -64,7 +65,9 @@ def rig(avatar: str | Path, output: str | Path, *, landmarks: str | Path | None 
     sets: vocabularies, see `shape_sets`; `DEFAULT_SETS` without. shapes: only those of these names. person: whose
     habits override expressions. template, template_landmarks: another face that has shapes, instead of facegen's own
     and its sets, see `read_template`. method, opening, pieces: as in `transfer`; weights: as `read_weights`
-    takes them. normals, quantise: as in `save_avatar`. Raises InputError and its children; nothing is written then. ::
+    takes them. normals, quantise: as in `save_avatar`. cache: use again how the skin was laid on the template, kept in
+    the user's cache folder, if avatar, landmarks, pieces and template are the same. Raises InputError and its children;
+    nothing is written then. ::
 
         facegen.rig("cat.obj", "cat.glb", landmarks="cat.yaml")
         facegen.load_face("cat.glb").pose("happiness")
@@ -85,7 +88,7 @@ def rig(avatar: str | Path, output: str | Path, *, landmarks: str | Path | None 
     places = load_landmarks(marks, source.mesh, mesh_name=path.name, digest=source.digest)
     warnings = [*check_places(places, source.mesh), *_without_expressions(source, asked.sets)]
     found = transfer(source.mesh, places, asked.template(), method=method, weights=chosen, opening=opening,
-                     pieces=pieces)
+                     pieces=pieces, kept=kept_in("registrations") if cache else None)
     made = {name: found.shapes[name] for name in asked.sets}
     expressions = {name: {name: 1.0} for name, kind in asked.sets.items() if kind == "vrm"}
     notes = _notes(source, places.points(source.mesh.vertices), found, asked.sets)

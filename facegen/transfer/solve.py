@@ -38,6 +38,8 @@ _TIE = 1e-7
 # A vertex without a partner, in a mouth's lining or on a body, stays where it is with this share of the anchor's
 # weight: the lips' motion is gone two centimetres into the mouth and does not push its walls through the cheeks.
 _STAY = 0.3
+# Shapes that are solved together, to bound the memory.
+_AT_A_TIME = 16
 # Millimetres over which the trust in a partner fades.
 _FADE = 6.0
 
@@ -118,9 +120,14 @@ class Transfer:
     def solve(self, motion: NDArray) -> NDArray[np.float64]:
         """Return the avatar's displacements (k, n, 3) for the template's (k, n_s, 3)."""
         n, n_s = self._shape
-        k = len(motion)
-        right = self._right @ np.ascontiguousarray(motion.reshape(k, 3 * n_s).T)            # (3 n, k)
-        return np.ascontiguousarray(np.moveaxis(self._factor.solve(right.reshape(n, 3 * k)).reshape(n, 3, k), 2, 0))
+        result = np.empty((len(motion), n, 3))
+        for start in range(0, len(motion), _AT_A_TIME):
+            some = motion[start:start + _AT_A_TIME]
+            k = len(some)
+            right = self._right @ np.ascontiguousarray(some.reshape(k, 3 * n_s).T)          # (3 n, k)
+            solved = self._factor.solve(right.reshape(n, 3 * k))
+            result[start:start + k] = np.moveaxis(solved.reshape(n, 3, k), 2, 0)
+        return result
 
 
 def rotation_between(a: NDArray, b: NDArray) -> NDArray[np.float64]:

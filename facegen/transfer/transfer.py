@@ -7,13 +7,14 @@ pieces as what they are, and back.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from facegen.errors import InputError, nearest
+from facegen.fileio.kept import Kept
 from facegen.geometry.mesh import Mesh
 from facegen.transfer.alignment import Similarity, align
 from facegen.transfer.apart import take_apart
@@ -47,13 +48,13 @@ class Transferred:
 
 def transfer(mesh: Mesh, landmarks: Landmarks, template: Template, *, method: str = "landmarks",
              weights: AnyWeights | None = None, opening: float = 1.0,
-             pieces: Mapping[str, str] | None = None) -> Transferred:
+             pieces: Mapping[str, str] | None = None, kept: Kept | None = None) -> Transferred:
     """Return the template's shapes on an avatar.
 
     mesh: the avatar, in any axes and units. landmarks: on it. method: "landmarks" (ours), or a published one to compare
     with: "sumner", "cloning". weights: of the energies, see `read_weights`; ours without. opening: a factor on how
-    far the jaw opens. pieces: part, material or number of a component -> kind. Raises InputError for what cannot be
-    used: unknown names, a mesh that cannot be solved.
+    far the jaw opens. pieces: part, material or number of a component -> kind. kept: where registrations are kept
+    and found again. Raises InputError for what cannot be used: unknown names, a mesh that cannot be solved.
     """
     if method not in METHODS:
         raise InputError(f"method: expected {', '.join(METHODS)}, got {method!r}{nearest(str(method), METHODS)}")
@@ -64,32 +65,31 @@ def transfer(mesh: Mesh, landmarks: Landmarks, template: Template, *, method: st
     frame = align(landmarks.points(mesh.vertices), template.landmarks)
     parts = take_apart(mesh, landmarks, frame, explicit=pieces)
     vertices, found, rows = parts.vertices, parts.pieces, parts.rows
-    skin = lay_skin(template, parts.surface, parts.places(template.places), opening=opening)
-    motion = np.zeros((len(template.names), len(vertices), 3))
-    motion[:, rows] = skin.motion(method, weights)
+    skin = lay_skin(template, parts.surface, parts.places(template.places), opening=opening, kept=kept)
+    on_skin = skin.motion(method, weights)
     contacts: Mapping[str, Contact] = {}
-    if method == "landmarks":
+    if method != "landmarks":
+        motion = _among_all(on_skin, rows, len(vertices))
+    else:
         moved = PieceMotion(found, vertices, parts.faces, parts.points)
         fronts = {f"eye_{s}": EyeFront(ball, vertices[moved.rows(f"eye_{s}")]) for s, ball in moved.eyes.items()}
         slits = [slit for slit in (closing(skin, slit, fronts.get(slit.name)) for slit in (*LIDS, LIPS)) if slit]
         slits = [] if skin.copied else slits        # a copy closes as the template does: there is nothing to mend
-        _on_skin(motion, rows, [slit.close for slit in slits])
+        for slit in slits:
+            slit.close(on_skin)
         jaw = None if skin.jaw is None else RigidMotions.of(lambda at: skin.jaw.movement(at, template.jaw))
-        motion = moved.move(motion, jaw, template.gaze)
+        motion = moved.move(_among_all(on_skin, rows, len(vertices)), jaw, template.gaze)
         motion, contacts = keep_apart(moved, motion, template.gaze)
-        _on_skin(motion, rows, [slit.seal for slit in slits])
-    result = motion.copy()
-    for row, other in enumerate(template.minus):
-        if other >= 0:
-            result[row] -= motion[other]
-    back = frame.inverse()
-    shapes = {name: back.apply_vectors(result[row][parts.own]) for row, name in enumerate(template.names)}
+        for slit in slits:
+            slit.seal(motion, rows)
+    back, shapes = frame.inverse(), {}
+    for name, shape, other in zip(template.names, motion, template.minus, strict=True):
+        shapes[name] = back.apply_vectors(shape if other < 0 else shape - motion[other])[parts.own]
     return Transferred(shapes, frame, skin, found, contacts)
 
 
-def _on_skin(motion: NDArray, rows: NDArray, steps: Sequence[Callable[[NDArray], None]]) -> None:
-    """Apply steps that change the skin's displacements (k, rows, 3) in place."""
-    skin = motion[:, rows]
-    for step in steps:
-        step(skin)
-    motion[:, rows] = skin
+def _among_all(on_skin: NDArray, rows: NDArray, n: int) -> NDArray[np.float64]:
+    """Return the displacements (k, n, 3) of all vertices, where those in ``rows`` are the skin's."""
+    motion = np.zeros((len(on_skin), n, 3))
+    motion[:, rows] = on_skin
+    return motion
