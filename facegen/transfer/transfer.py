@@ -66,7 +66,8 @@ def transfer(mesh: Mesh, landmarks: Landmarks, template: Template, *, method: st
     vertices, found, rows = parts.vertices, parts.pieces, parts.rows
     skin = lay_skin(template, parts.surface, parts.places(template.places), opening=opening)
     motion = np.zeros((len(template.names), len(vertices), 3))
-    motion[:, rows] = skin.motion(method, weights)
+    on_skin = skin.motion(method, weights)
+    motion[:, rows] = on_skin
     contacts: Mapping[str, Contact] = {}
     if method == "landmarks":
         moved = PieceMotion(found, vertices, parts.faces, parts.points)
@@ -77,6 +78,8 @@ def transfer(mesh: Mesh, landmarks: Landmarks, template: Template, *, method: st
         jaw = None if skin.jaw is None else RigidMotions.of(lambda at: skin.jaw.movement(at, template.jaw))
         motion = moved.move(motion, jaw, template.gaze)
         motion, contacts = keep_apart(moved, motion, template.gaze)
+        if skin.copied:             # whatever pokes through it there
+            motion[:, rows] = on_skin
         _on_skin(motion, rows, [slit.seal for slit in slits])
     result = motion.copy()
     for row, other in enumerate(template.minus):
