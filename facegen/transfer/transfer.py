@@ -80,6 +80,8 @@ def transfer(mesh: Mesh, landmarks: Landmarks, template: Template, *, method: st
         jaw = None if skin.jaw is None else RigidMotions.of(lambda at: skin.jaw.movement(at, template.jaw))
         motion = moved.move(_among_all(on_skin, rows, len(vertices)), jaw, template.gaze)
         motion, contacts = keep_apart(moved, motion, template.gaze)
+        if skin.copied:             # whatever pokes through it there
+            motion[:, rows] = on_skin
         for slit in slits:
             slit.seal(motion, rows)
     back, shapes = frame.inverse(), {}
