@@ -88,7 +88,8 @@ def text(measured: Measured, *, plotted: bool) -> str:
     race = {count: row for count, row in measured.triangles.items() if count in _TARGETS}
     whole = {detail: f"detail {detail}" for detail in measured.whole}
     parts = [
-        "# Benchmarks", _opening(measured), "## What it says", _reading(race, measured),
+        "# Benchmarks", "Of the renderers. How long avatars take, `python benchmarks/transfer.py`: "
+        "[transfer speed](transfer-speed.md).", _opening(measured), "## What it says", _reading(race, measured),
         "## A frame", "CPU milliseconds, median (least), of one picture of 512 x 512 pixels. CPU time is that of "
         "all threads of the process; the skin of the face is cut into as many triangles as said.",
         _table(race, lambda n: f"{n:,}", lambda r: f"{r.cpu:.1f} ({r.least:.1f})"),

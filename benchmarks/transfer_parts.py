@@ -1,6 +1,7 @@
-"""One step with one tool, in a process of its own: python benchmarks/transfer_parts.py TOOL AVATAR ...
+"""One step with one tool, in a process of its own: python benchmarks/transfer_parts.py SECONDS TOOL AVATAR ...
 
-The last line printed is JSON: seconds and CPU seconds of steps, and the process' peak of memory in MiB.
+It is ended after so many CPU seconds. The last line printed is JSON: seconds and CPU seconds of steps, and the process'
+peak of memory in MiB.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ import numpy as np
 
 # Shapes that the plain reference solves; the others are extrapolated.
 SOLVED = 2
-REGISTRATIONS = ("trimesh nricp_sumner", "trimesh nricp_amberg", "pycpd deformable")
+REGISTRATIONS = ("trimesh nricp_sumner", "trimesh nricp_amberg")
 PEERS = (*REGISTRATIONS, "Sumner, a solve for each shape")
 
 
@@ -110,10 +111,6 @@ def prepared(name: str, skin) -> Callable[[], object]:
     marks = [mark for mark in skin.places if mark in skin.template.landmarks]
     at = np.array([skin.places[mark][0][np.argmax(skin.places[mark][1])] for mark in marks])
     goals = np.array([skin.template.landmarks[mark] for mark in marks])
-    if name == "pycpd deformable":
-        from pycpd import DeformableRegistration
-
-        return DeformableRegistration(X=template.vertices[np.unique(template.faces)], Y=surface.vertices).register
     import trimesh
     from trimesh import registration
 
@@ -148,6 +145,7 @@ def sumner(skin) -> None:
 
 
 if __name__ == "__main__":
-    tool, *rest = sys.argv[1:]
+    bound, tool, *rest = sys.argv[1:]
+    resource.setrlimit(resource.RLIMIT_CPU, (int(bound), int(bound) + 5))
     figures = facegen(*rest) if tool == "facegen" else peer(tool, *rest)
     print(json.dumps({**used(), **figures}))
