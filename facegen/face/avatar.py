@@ -74,7 +74,7 @@ class AvatarFace:
         self.path = avatar.path
         self.digest = avatar.digest
         self.colours: Mapping[str, tuple[float, float, float]] = dict(avatar.colours)
-        self.notes: Notes = read_notes(avatar.notes, str(avatar.path), backward=_is_vrm0(avatar))
+        self.notes: Notes = read_notes(avatar.notes, str(avatar.path), backward=avatar.is_vrm0)
         self._file = avatar
         self._mesh = replace(avatar.mesh, vertices=self.notes.apply(avatar.mesh.vertices),
                              colours=avatar.vertex_colours)
@@ -256,12 +256,6 @@ class AvatarFace:
         for part in set(self.notes.parts("body")) & set(self._mesh.parts):
             weight[self._mesh.part_vertices(part)] = 0.0
         return weight
-
-
-def _is_vrm0(avatar: AvatarFile) -> bool:
-    """Return whether a file is of VRM 0.x, whose avatars look to -z."""
-    found = getattr(getattr(avatar.source, "file", None), "json", {})
-    return isinstance(found.get("extensions"), Mapping) and "VRM" in found["extensions"]
 
 
 def _head_of(found: Resolution) -> Mapping[str, float]:

@@ -24,6 +24,11 @@ _SEEN = 0.03
 _NEAR, _FAR = 1.35, 1.8
 
 
+def half_name(shape: str) -> str:
+    """Return what the corrective of a shape half way is called in a file."""
+    return f"{shape}_half"
+
+
 def halfway(pieces: PieceMotion, lids: Sequence[Closing], rows: NDArray, motion: Array,
             still: NDArray[np.bool_]) -> dict[int, Array]:
     """Return shape -> corrective (n, 3), mm, for the shapes that need one.

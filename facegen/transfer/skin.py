@@ -32,6 +32,8 @@ METHODS = ("landmarks", "sumner", "cloning")
 
 # Millimetres: partners farther than this are none once the skin is registered.
 _REACH = 10.0
+# Millimetres: a file's rounding. The skin of a copy lies this near to the template's.
+_COPY = 1e-3
 # A side's bending is measured on so many shapes at a time, to bound the memory.
 _AT_A_TIME = 16
 # Above this many triangles the avatar is as fine as the template everywhere that matters: the search is left out.
@@ -61,6 +63,14 @@ class Skin:
         """The template's partner of each vertex."""
         return self.correspondence(self.registered, vertex_normals(self.registered, self.surface.faces), self.sides,
                                    reach=_REACH)
+
+    @property
+    def copied(self) -> bool:
+        """Whether the skin is the template's own, vertex for vertex within rounding: it then moves as that does."""
+        feet = self.feet
+        stays = np.abs(self.registered - self.surface.vertices).max() < _COPY
+        at_vertices = feet.weights.max(axis=1) > 1 - _COPY
+        return bool(stays and feet.found.all() and at_vertices.all() and feet.distances.max() < _COPY)
 
     @cached_property
     def parts(self) -> PartMotion:

@@ -5,7 +5,8 @@ import pytest
 
 from facegen.face.face import load_face
 from facegen.fileio.avatar import load_avatar
-from facegen.transfer.rig import half_name, rig
+from facegen.transfer.halfway import half_name
+from facegen.transfer.rig import rig
 
 
 @pytest.fixture(scope="module")

@@ -10,8 +10,9 @@ from facegen.errors import FileError, InputError
 from facegen.face.face import load_face
 from facegen.fileio.avatar import load_avatar
 from facegen.geometry.mesh import Mesh
+from facegen.transfer.halfway import half_name
 from facegen.transfer.landmarks import Landmarks
-from facegen.transfer.rig import avatar_names, half_name, rig
+from facegen.transfer.rig import avatar_names, rig
 from facegen.transfer.transfer import transfer
 
 
