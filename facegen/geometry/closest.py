@@ -22,6 +22,9 @@ _LARGE = 2.0
 # Because a foot on a side is as near on one triangle as on the other, and rounding is not to decide: squares of
 # distances count as one below this share, of the square or of a typical triangle's; cosines below that difference.
 _SAME, _ALIKE = 1e-9, 1e-6
+# Labels of two places contradict each other where their product is below this. Because the edges of closed lips, a
+# tenth of a millimetre apart, have labels of a quarter with opposite signs, and a cheek beside them has less.
+_CONTRADICTION = -0.01
 _TINY = 1e-300
 
 
@@ -64,7 +67,7 @@ class ClosestPoints:
 
         normals (p, 3): only triangles whose normal has more than ``least_cosine`` with it are allowed (Onizuka 2018,
         section 4.2: within 90 degrees, so that the two lips are not confused). labels: numbers of the points (p, k)
-        and of the triangles (m, k); a triangle is allowed where no product of two is below minus a quarter - the
+        and of the triangles (m, k); a triangle is allowed where no product of two is below `_CONTRADICTION`: the
         signs say on which side of a slit a place lies.
         """
         points = np.asarray(points, float)
@@ -75,7 +78,7 @@ class ClosestPoints:
             np.einsum("pi,pki->pk", normals, self.surface.normals[near])
         allowed = facing > least_cosine
         if labels is not None:
-            allowed &= (labels[0][:, None, :] * labels[1][near] > -0.25).all(axis=2)
+            allowed &= (labels[0][:, None, :] * labels[1][near] > _CONTRADICTION).all(axis=2)
         v, w = np.zeros((2, len(points), k))
         square = np.full((len(points), k), np.inf)              # of the distance
         columns = np.ascontiguousarray(points.T)

@@ -22,6 +22,7 @@ from facegen.transfer.alignment import Similarity, align
 from facegen.transfer.baselines import PaperWeights
 from facegen.transfer.closing import closing
 from facegen.transfer.eyeball import EyeFront
+from facegen.transfer.halfway import halfway
 from facegen.transfer.keep_apart import Contact, keep_apart
 from facegen.transfer.landmarks import Landmarks
 from facegen.transfer.margins import LIDS, LIPS
@@ -40,13 +41,15 @@ _LEAST_OPENING, _MOST_OPENING = 0.1, 3.0
 class Transferred:
     """``shapes``: name -> displacement (n, 3) of the avatar's own vertices, in its own axes and units. ``frame``: from
     there to the template's. ``skin``, ``pieces``: what the avatar was taken for; ``contacts``: how far eyes and teeth
-    went through the skin before and after they were kept apart, mm."""
+    went through the skin before and after they were kept apart, mm. ``halves``: shape -> its corrective half way, see
+    `halfway`."""
 
     shapes: Mapping[str, NDArray]
     frame: Similarity
     skin: Skin
     pieces: tuple[Piece, ...]
     contacts: Mapping[str, Contact]
+    halves: Mapping[str, NDArray]
 
 
 def transfer(mesh: Mesh, landmarks: Landmarks, template: Template, *, method: str = "landmarks",
@@ -74,6 +77,7 @@ def transfer(mesh: Mesh, landmarks: Landmarks, template: Template, *, method: st
                     kept=kept)
     on_skin = skin.motion(method, weights)
     contacts: Mapping[str, Contact] = {}
+    halves: Mapping[int, NDArray] = {}
     if method != "landmarks":
         motion = _among_all(on_skin, rows, len(vertices))
     else:
@@ -87,10 +91,14 @@ def transfer(mesh: Mesh, landmarks: Landmarks, template: Template, *, method: st
         motion, contacts = keep_apart(moved, motion, template.gaze)
         for slit in slits:
             slit.seal(motion, rows)
+        lids = [slit for slit in slits if slit.eye is not None]
+        still = ~(template.jaw.any(axis=1) | template.gaze.any(axis=1))
+        halves = halfway(moved, lids, rows, motion, still)
     back, shapes = frame.inverse(), {}
     for name, shape, other in zip(template.names, motion, template.minus, strict=True):
         shapes[name] = back.apply_vectors(shape if other < 0 else shape - motion[other])[own]
-    return Transferred(shapes, frame, skin, found, contacts)
+    bent = {template.names[k]: back.apply_vectors(one[own]) for k, one in halves.items()}
+    return Transferred(shapes, frame, skin, found, contacts, bent)
 
 
 def _among_all(on_skin: NDArray, rows: NDArray, n: int) -> NDArray[np.float64]:
