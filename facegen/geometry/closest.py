@@ -19,12 +19,12 @@ _TRIED = 12
 _FIRST = 3
 # Because a triangle with a side of more than this many typical sides would be missed by its middle alone.
 _LARGE = 2.0
-# Because a foot on a side is as near on one triangle as on the other, and rounding is not to decide: squares of
-# distances count as one below this share, of the square or of a typical triangle's; cosines below that difference.
-_SAME, _ALIKE = 1e-9, 1e-6
 # Labels of two places contradict each other where their product is below this. Because the edges of closed lips, a
 # tenth of a millimetre apart, have labels of a quarter with opposite signs, and a cheek beside them has less.
 _CONTRADICTION = -0.01
+# Because a foot on a side is as near on one triangle as on the other, and rounding is not to decide: squares of
+# distances count as one below this share, of the square or of a typical triangle's; cosines below that difference.
+_SAME, _ALIKE = 1e-9, 1e-6
 _TINY = 1e-300
 
 

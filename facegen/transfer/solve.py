@@ -38,11 +38,11 @@ _ALONE = 0.05
 _TIE = 1e-7
 # A vertex without a partner, in a mouth's depth or on a body, stays where it is with this share of the anchor's weight.
 _STAY = 0.3
-# Shapes that are solved together, to bound the memory.
-_AT_A_TIME = 16
 # But a lining, which is without a partner too, moves as the skin over it does, so that it does not come through: wholly
 # where that skin is no thicker than the first, not at all from the second on, mm.
 _THIN, _THICK = 5.0, 20.0
+# Shapes that are solved together, to bound the memory.
+_AT_A_TIME = 16
 # Millimetres over which the trust in a partner fades.
 _FADE = 6.0
 
