@@ -15,7 +15,6 @@ from scipy.spatial.transform import Rotation
 
 from facegen.errors import InputError
 from facegen.face.face import load_face
-from facegen.geometry.ahead import _over
 from facegen.transfer.eyeball import fit_eye, gaze_rotation
 from facegen.transfer.keep_apart import keep_apart
 from facegen.transfer.piece_motion import PieceMotion, RigidMotions
