@@ -99,6 +99,11 @@ def keep_apart(pieces: PieceMotion, motion: ArrayLike,
     return motion, found
 
 
+def _move(motion: Array, rows: NDArray, size: float) -> NDArray[np.bool_]:
+    """Return in which shapes (k,) any of the vertices moves by more than nothing of something of a size, mm."""
+    return np.abs(motion[:, rows]).max(axis=(1, 2), initial=0.0) > _DONE * size
+
+
 class _Spread:
     """Spreads pushes over the skin: at least the push itself, and less and less of it round it."""
 
@@ -175,7 +180,7 @@ class _Lids:
         if not len(self._corners):
             return Contact(before, after)
         turns = np.any(turn != np.eye(3), axis=(1, 2))
-        moves = np.any(motion[:, np.unique(self._corners)] != 0, axis=(1, 2))
+        moves = _move(motion, np.unique(self._corners), self._ball.radius)
         for k in np.flatnonzero(moves | turns):
             for step in range(_ROUNDS + 1):
                 missing = self._missing(motion[k], turn[k] if turns[k] else None, allowed[k])
@@ -244,8 +249,7 @@ class _Lips:
         faces = self._faces[close[:, :2].all(axis=1)]
         skin, local = np.unique(faces, return_inverse=True)
         local = local.reshape(-1, 3)
-        moves = np.any(motion[:, skin] != 0, axis=(1, 2)) | np.any(motion[:, own] != 0, axis=(1, 2))
-        for k in np.flatnonzero(moves):
+        for k in np.flatnonzero(_move(motion, np.concatenate([skin, own]), self._height)):
             given = 0.0
             for step in range(_ROUNDS + 1):
                 places = (self._rest[own] + motion[k, own]) @ self._axes.T
@@ -277,11 +281,12 @@ class _Lips:
             return Contact(before, after)
         inner = [pieces.faces[piece.faces] for piece in pieces.pieces if piece.kind in ("skin", "mouth")]
         spread = _Spread(Surface(self._rest, np.concatenate(inner)))
-        front = np.unique(self._faces)
-        for k in np.flatnonzero(np.any(motion[:, front] != 0, axis=(1, 2)) | np.any(motion[:, own] != 0, axis=(1, 2))):
+        front, local = np.unique(self._faces, return_inverse=True)
+        local = local.reshape(-1, 3)
+        for k in np.flatnonzero(_move(motion, np.concatenate([front, own]), self._height)):
             for step in range(_ROUNDS + 1):
                 places = (self._rest[own] + motion[k, own]) @ self._axes.T
-                now, which = ahead(places, (self._rest + motion[k])[self._faces] @ self._axes.T)
+                now, which = ahead(places, ((self._rest[front] + motion[k, front]) @ self._axes.T)[local])
                 missing = np.where((which >= 0) & (now > -_THROUGH * self._height), np.maximum(least - now, 0.0), 0.0)
                 after[k] = missing.max()
                 before[k] = after[k] if step == 0 else before[k]

@@ -12,11 +12,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
-from scipy.interpolate import CubicSpline
 from scipy.sparse.csgraph import dijkstra
 from scipy.spatial import cKDTree
 
 from facegen.geometry.operators import Surface
+from facegen.geometry.spline import smooth_curve
 from facegen.transfer.sides import SLITS
 from facegen.transfer.skin import Skin
 
@@ -133,7 +133,7 @@ def _stops(slit: Slit, names: tuple[str, ...], places: Places) -> NDArray | None
 def _curve(stops: Array) -> Array:
     """Return a smooth curve (g, 3) through some places (s, 3)."""
     t = _lengths(stops, 1e-9)               # a spline's knots must differ
-    return CubicSpline(t, stops)(np.linspace(0, t[-1], _GUIDE))
+    return smooth_curve(t, stops, np.linspace(0, t[-1], _GUIDE))
 
 
 def _way(surface: Surface, at: Array, stops: NDArray, line: Array, side: Array) -> NDArray | None:
