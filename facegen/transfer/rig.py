@@ -83,7 +83,7 @@ def rig(avatar: str | Path, output: str | Path, *, landmarks: str | Path | None 
     notes = _notes(source, places.points(source.mesh.vertices), found, recipes)
     written = save_avatar(source, output, shapes, notes=notes, normals=normals, quantise=quantise,
                           expressions=expressions if _is_vrm(source) else {})
-    return Rigged(written, tuple(shapes), warnings, found)
+    return Rigged(written, tuple(shapes), warnings + found.warnings, found)
 
 
 @lru_cache(maxsize=1)         # many avatars with the same shapes; a template is tens of megabytes

@@ -8,7 +8,7 @@ pieces as what they are, and back.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,6 +27,7 @@ from facegen.transfer.margins import LIDS, LIPS
 from facegen.transfer.piece_motion import PieceMotion, RigidMotions
 from facegen.transfer.pieces import Piece, face_names, find_pieces
 from facegen.transfer.skin import METHODS, Skin, lay_skin
+from facegen.transfer.skin_mesh import skin_mesh
 from facegen.transfer.solve import Weights
 from facegen.transfer.template import Template
 from facegen.transfer.weld import weld
@@ -39,13 +40,14 @@ _LEAST_OPENING, _MOST_OPENING = 0.1, 3.0
 class Transferred:
     """``shapes``: name -> displacement (n, 3) of the avatar's own vertices, in its own axes and units. ``frame``: from
     there to the template's. ``skin``, ``pieces``: what the avatar was taken for; ``contacts``: how far eyes and teeth
-    went through the skin before and after they were kept apart, mm."""
+    went through the skin before and after they were kept apart, mm. ``warnings``: what was odd about the mesh."""
 
     shapes: Mapping[str, NDArray]
     frame: Similarity
     skin: Skin
     pieces: tuple[Piece, ...]
     contacts: Mapping[str, Contact]
+    warnings: tuple[str, ...] = ()
 
 
 def transfer(mesh: Mesh, landmarks: Landmarks, template: Template, *, method: str = "landmarks",
@@ -68,13 +70,16 @@ def transfer(mesh: Mesh, landmarks: Landmarks, template: Template, *, method: st
     vertices, own = weld(turned, mesh.faces)
     faces = own[mesh.faces]
     found = find_pieces(vertices, faces, places, names=face_names(mesh), explicit=pieces)
-    rows, surface = _skin_surface(vertices, faces, found)
+    own_faces = np.concatenate([piece.faces for piece in found if piece.kind == "skin"])
+    tidy = skin_mesh(vertices, faces[own_faces], own_faces, places)
+    rows, surface = tidy.rows, tidy.surface
     skin = lay_skin(template, surface, _skin_places(landmarks, own, rows, surface, places, template), opening=opening)
     motion = np.zeros((len(template.names), len(vertices), 3))
     motion[:, rows] = skin.motion(method, weights)
     contacts: Mapping[str, Contact] = {}
     if method == "landmarks":
-        moved = PieceMotion(found, vertices, faces, places)
+        solid = [replace(piece, faces=tidy.numbers) if piece.kind == "skin" else piece for piece in found]
+        moved = PieceMotion(solid, vertices, tidy.wound(faces), places)
         fronts = {f"eye_{s}": EyeFront(ball, vertices[moved.rows(f"eye_{s}")]) for s, ball in moved.eyes.items()}
         slits = [slit for slit in (closing(skin, slit, fronts.get(slit.name)) for slit in (*LIDS, LIPS)) if slit]
         _on_skin(motion, rows, [slit.close for slit in slits])
@@ -82,13 +87,14 @@ def transfer(mesh: Mesh, landmarks: Landmarks, template: Template, *, method: st
         motion = moved.move(motion, jaw, template.gaze)
         motion, contacts = keep_apart(moved, motion, template.gaze)
         _on_skin(motion, rows, [slit.seal for slit in slits])
+    tidy.carry(motion)
     result = motion.copy()
     for row, other in enumerate(template.minus):
         if other >= 0:
             result[row] -= motion[other]
     back = frame.inverse()
     shapes = {name: back.apply_vectors(result[row][own]) for row, name in enumerate(template.names)}
-    return Transferred(shapes, frame, skin, found, contacts)
+    return Transferred(shapes, frame, skin, found, contacts, tidy.notes)
 
 
 def _on_skin(motion: NDArray, rows: NDArray, steps: Sequence[Callable[[NDArray], None]]) -> None:
@@ -97,14 +103,6 @@ def _on_skin(motion: NDArray, rows: NDArray, steps: Sequence[Callable[[NDArray],
     for step in steps:
         step(skin)
     motion[:, rows] = skin
-
-
-def _skin_surface(vertices: NDArray, faces: NDArray, pieces: tuple[Piece, ...]) -> tuple[NDArray, Surface]:
-    """Return the skin's vertices (n,) among all, and its surface over them."""
-    triangles = faces[np.concatenate([piece.faces for piece in pieces if piece.kind == "skin"])]
-    flat = (triangles == np.roll(triangles, 1, axis=1)).any(axis=1)         # what welding made lines of
-    rows, local = np.unique(triangles[~flat], return_inverse=True)
-    return rows, Surface(vertices[rows], local.reshape(-1, 3).astype(np.int32))
 
 
 def _skin_places(landmarks: Landmarks, own: NDArray, rows: NDArray, surface: Surface, places: Mapping[str, NDArray],
