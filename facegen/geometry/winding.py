@@ -29,8 +29,8 @@ class Winding:
 def winding(surface: Surface) -> Winding:
     """Return how the triangles of a surface are wound.
 
-    Every triangle stands twice in a graph, as it is and turned; an edge joins what looks to the same side. A patch falls
-    apart into its two sides there, or hangs together if it has but one.
+    Every triangle stands twice in a graph, as it is and turned; an edge joins what looks to the same side. A patch
+    falls apart into its two sides there, or hangs together if it has but one.
     """
     m = len(surface.faces)
     edges, of_side = surface.edges

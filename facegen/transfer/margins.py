@@ -17,7 +17,7 @@ from scipy.sparse.csgraph import dijkstra
 from scipy.spatial import cKDTree
 
 from facegen.geometry.operators import Surface
-from facegen.transfer.sides import SLITS
+from facegen.transfer.sides import SLITS, painted
 from facegen.transfer.skin import Skin
 
 Array = NDArray[np.float64]
@@ -78,6 +78,8 @@ class Margins:
 def facing_margins(skin: Skin, slit: Slit) -> tuple[Margins, Margins] | None:
     """Return the edges of a slit of the template and of the avatar's skin, or None where either has none."""
     template = skin.template
+    if slit.side in painted(skin.surface, skin.places, skin.sides):
+        return None
     own = find_margins(template.surface, slit, template.places, skin.correspondence.sides)
     if own is None:
         return None

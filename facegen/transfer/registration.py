@@ -25,6 +25,7 @@ from facegen.geometry.closest import ClosestPoints, Feet
 from facegen.geometry.factor import Factor
 from facegen.geometry.normals import vertex_normals
 from facegen.geometry.operators import Surface, dirichlet, hinge_energy
+from facegen.transfer.sides import torn
 
 
 @dataclass(frozen=True)
@@ -57,10 +58,11 @@ _SIDED = 0.3
 class Correspondence:
     """The search for partners on the template: normal-aware, no crossing of slits, no partner on the border."""
 
-    def __init__(self, template: Surface, sides: NDArray) -> None:
+    def __init__(self, template: Surface, sides: NDArray, painted: tuple[int, ...] = ()) -> None:
+        """template, sides: with its `side_fields`. painted: slits that the avatar has not, see `torn`."""
         self.template = template
         self._search = ClosestPoints(template)
-        self.sides = sides
+        self.sides, self._painted = sides, painted
         self._face_sides = _plainly(sides[template.faces].mean(axis=1))
         _edges, of_side = template.edges
         border = template.border_edges
@@ -77,6 +79,8 @@ class Correspondence:
         beyond = ~(feet.distances <= reach)
         on_side = feet.weights[:, [2, 0, 1]] < 1e-9         # no weight of the corner opposite side k
         beyond |= feet.found & (on_side & self._border_side[feet.faces]).any(axis=1) & (feet.distances > _PAST)
+        if self._painted:
+            beyond |= feet.found & torn(sides, self._face_sides[feet.faces], self._painted)
         return Feet(np.where(beyond, -1, feet.faces), feet.weights, feet.points, feet.distances)
 
 

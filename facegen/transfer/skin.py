@@ -22,7 +22,7 @@ from facegen.transfer.jaw import JawMotion, avatar_jaw, jaw_share
 from facegen.transfer.part_motion import MEMBERS, PartMotion, part_motion, spread
 from facegen.transfer.refine import BEND, refine
 from facegen.transfer.registration import Correspondence, register
-from facegen.transfer.sides import settled, side_fields
+from facegen.transfer.sides import painted, settled, side_fields
 from facegen.transfer.solve import OURS, Transfer, Weights, landmark_matrix
 from facegen.transfer.template import Template, placing
 
@@ -161,8 +161,9 @@ def lay_skin(template: Template, surface: Surface, places: Mapping[str, tuple[ND
     surface: the skin in the template's frame, mm. places: its landmarks. registered: from an earlier call with the same
     skin, landmarks and template, to save the time. Raises InputError where the mesh cannot be solved.
     """
-    correspondence = Correspondence(template.surface, side_fields(template.surface, template.places))
     sides = side_fields(surface, places)
+    correspondence = Correspondence(template.surface, side_fields(template.surface, template.places),
+                                    painted(surface, places, sides))
     places = settled(surface, places, sides)
     if registered is None:
         names = [name for name in places if name in template.places]

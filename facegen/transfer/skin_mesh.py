@@ -24,8 +24,8 @@ from facegen.geometry.winding import winding
 _FLAT = 1e-4
 # The landmarks' triangles look ahead on every face that looks out, a horse's too; less than this tells nothing.
 _LOOKS = 0.1
-# Because a side without a length would tie two vertices infinitely firmly: it counts as this share of the mean.
-_SHORTEST = 1e-6
+# Where flat triangles leave a corner undecided it keeps near the others: this firmly, so that it never outvotes them.
+_LOOSE = 1e-6
 # So many triangles are named.
 _NAMED = 5
 
@@ -33,8 +33,8 @@ _NAMED = 5
 @dataclass(frozen=True, eq=False)
 class SkinMesh:
     """``rows`` (n,): the vertices of the skin among all; ``surface`` over them. ``numbers`` (m,) of its triangles, and
-    ``turned``, those that looked in. ``hanging`` (h,): vertices that only triangles without an area hold, and ``hang`` (h, all): the
-    weights of those they hang on. ``notes``: what was put in order, a sentence each."""
+    ``turned``, those that looked in. ``hanging`` (h,): vertices that only triangles without an area hold, and ``hang``
+    (h, all): the weights of those they hang on. ``notes``: what was put in order, a sentence each."""
 
     rows: NDArray[np.int64]
     surface: Surface
@@ -68,11 +68,11 @@ def skin_mesh(vertices: NDArray, faces: NDArray, numbers: NDArray, places: Mappi
         raise InputError(f"mesh: none of the skin's {len(faces)} triangles has an area (first: "
                          f"{_listed(numbers)}); expected a surface")
     solid, named = faces[~flat], numbers[~flat]
-    _, first, count = np.unique(np.sort(solid, axis=1), axis=0, return_index=True, return_counts=True)
+    _, first = np.unique(np.sort(solid, axis=1), axis=0, return_index=True)
     if len(first) < len(solid):
         again = np.setdiff1d(np.arange(len(solid)), first)
-        notes.append(f"the skin has {_triangles(len(again))} twice or more (again: {_listed(named[again])}): shapes are "
-                     "made as if each stood once")
+        notes.append(f"the skin has {_triangles(len(again))} twice or more (again: {_listed(named[again])}): shapes "
+                     "are made as if each stood once")
         keep = np.sort(first)
         solid, named = solid[keep], named[keep]
     rows, local = np.unique(solid, return_inverse=True)
@@ -104,8 +104,8 @@ def _inward(surface: Surface, numbers: NDArray, places: Mapping[str, NDArray]) -
     notes = []
     if found.one_sided.any():
         rows = np.flatnonzero(found.one_sided[found.patch])
-        notes.append(f"the skin has {_triangles(len(rows))} (first: {_listed(numbers[rows])}) of a surface with one side "
-                     "only, a Moebius strip: nothing tells which way it looks, and shapes there may be wrong")
+        notes.append(f"the skin has {_triangles(len(rows))} (first: {_listed(numbers[rows])}) of a surface with one "
+                     "side only, a Moebius strip: nothing tells which way it looks, and shapes there may be wrong")
     if found.against.any():
         notes.append(f"the skin has {_triangles(int(found.against.sum()))} wound against their neighbours (first: "
                      f"{_listed(numbers[found.against])}): shapes are made as if they were turned")
@@ -116,33 +116,37 @@ def _inward(surface: Surface, numbers: NDArray, places: Mapping[str, NDArray]) -
     if ahead < -_LOOKS:
         told = np.bincount(found.patch[feet.faces], looks, minlength=len(backwards))
         backwards = (told <= 0) & ~found.one_sided
-        notes.append("the skin is wound inside out: its triangles run clockwise seen from outside; shapes are made as if "
-                     "they were turned, but a renderer that draws front faces only shows the inside")
+        notes.append("the skin is wound inside out: its triangles run clockwise seen from outside; shapes are made as "
+                     "if they were turned, but a renderer that draws front faces only shows the inside")
     return found.against ^ backwards[found.patch], notes
 
 
 def _hanging(vertices: NDArray, flat: NDArray, held: NDArray) -> tuple[NDArray, sparse.csr_array]:
     """Return the vertices (h,) of flat triangles that no solid one holds, and what they hang on (h, all).
 
-    Along a chain of sides the motion changes evenly with the length: the harmonic function with springs of 1 / length.
+    In each such triangle the middle corner divides the way between the others: it does so in least squares when moved.
     """
     n = len(vertices)
-    free = np.setdiff1d(flat, held)
-    nothing = sparse.csr_array((0, n))
-    if not len(free):
-        return free, nothing
-    sides = np.unique(np.sort(flat[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1), axis=0)
-    sides = sides[sides[:, 0] != sides[:, 1]]
-    length = np.linalg.norm(vertices[sides[:, 0]] - vertices[sides[:, 1]], axis=1)
-    stiff = 1 / np.maximum(length, _SHORTEST * max(length.mean(), np.finfo(float).tiny))
-    a, b = sides.T
-    graph = sparse.coo_array((np.tile(stiff, 2), (np.r_[a, b], np.r_[b, a])), shape=(n, n)).tocsr()
-    # What hangs on nothing rests; so does the rest of its chain.
-    matrix = sparse.diags_array(graph.sum(axis=1)[free] * (1 + 1e-12)) - graph[free][:, free]
-    on = np.intersect1d(flat, held)
-    if not len(on):
-        return free[:0], nothing
-    weights = Factor(matrix, what="the skin's triangles without an area").solve(graph[free][:, on].toarray())
+    free, on = np.setdiff1d(flat, held), np.intersect1d(flat, held)
+    if not len(free) or not len(on):
+        return free[:0], sparse.csr_array((0, n))
+    corners = vertices[flat]
+    sides = np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2)      # from corner k to the next
+    middle = (sides.argmax(axis=1) + 2) % 3
+    m, p, q = (flat[np.arange(len(flat)), (middle + k) % 3] for k in range(3))
+    way = vertices[q] - vertices[p]
+    share = np.einsum("ti,ti->t", vertices[m] - vertices[p], way)
+    share = np.clip(share / np.maximum(np.einsum("ti,ti->t", way, way), np.finfo(float).tiny), 0.0, 1.0)
+    rows = np.arange(len(flat))
+    divide = sparse.coo_array((np.concatenate([np.ones(len(flat)), share - 1, -share]),
+                               (np.tile(rows, 3), np.concatenate([m, p, q]))), shape=(len(flat), n)).tocsr()
+    a, b = np.concatenate([flat[:, [0, 1]], flat[:, [1, 2]], flat[:, [2, 0]]]).T
+    every = np.arange(len(a))
+    link = sparse.coo_array((np.repeat([1.0, -1.0], len(a)), (np.tile(every, 2), np.concatenate([a, b]))),
+                            shape=(len(a), n)).tocsr()
+    energy = (divide.T @ divide + _LOOSE * (link.T @ link)).tocsr()
+    own = energy[free][:, free] + _LOOSE**2 * sparse.identity(len(free))        # what hangs on nothing rests
+    weights = Factor(own, what="the skin's triangles without an area").solve(-energy[free][:, on].toarray())
     rows, columns = np.nonzero(weights)
     return free, sparse.csr_array((weights[rows, columns], (rows, on[columns])), shape=(len(free), n))
 
