@@ -34,6 +34,8 @@ from facegen.transfer.weld import weld
 
 # The jaw of an avatar opens between these shares of what is estimated; more is a mistake.
 _LEAST_OPENING, _MOST_OPENING = 0.1, 3.0
+# Because squares of larger numbers, and float32 in files, run over.
+_FARTHEST = 1e30
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,6 +66,10 @@ def transfer(mesh: Mesh, landmarks: Landmarks, template: Template, *, method: st
         raise InputError(f"method: expected {', '.join(METHODS)}, got {method!r}{nearest(str(method), METHODS)}")
     if not _LEAST_OPENING <= opening <= _MOST_OPENING:
         raise InputError(f"opening: expected a factor of {_LEAST_OPENING} to {_MOST_OPENING}, got {opening!r}")
+    far = np.flatnonzero((np.abs(mesh.vertices) > _FARTHEST).any(axis=1))
+    if len(far):
+        raise InputError(f"mesh: {len(far)} of {len(mesh.vertices)} vertices lie beyond {_FARTHEST:g} (first: "
+                         f"{', '.join(map(str, far[:5]))}); remove them or write the mesh in larger units")
     frame = align(landmarks.points(mesh.vertices), template.landmarks)
     turned = frame.apply(mesh.vertices)
     places = landmarks.points(turned)

@@ -235,6 +235,14 @@ def test_a_skin_without_area_is_refused_by_number():
         skin_mesh(line, faces, 40 + np.arange(10), {})
 
 
+def test_vertices_beyond_all_numbers_are_refused_by_number(plain, few):
+    mesh, marks, _ = plain
+    vertices = mesh.vertices.copy()
+    vertices[[3, 40]] = 1e200
+    with pytest.raises(InputError, match=r"2 of 3470 vertices lie beyond 1e\+30 \(first: 3, 40\)"):
+        transfer(mesh.with_vertices(vertices), marks, few)
+
+
 def test_a_one_sided_strip_is_told():
     """A Moebius strip: no winding fits."""
     k = 20
