@@ -30,6 +30,8 @@ SAMPLES = 33
 _NARROW = 0.7
 # A way on the wrong side of the slit is so many times as long.
 _WRONG_SIDE = 20.0
+# An edge this many times as long as the line through its landmarks goes round something else: there is no slit.
+_LONGEST = 2.5
 # A guide is sampled at so many places.
 _GUIDE = 200
 
@@ -90,7 +92,7 @@ def facing_margins(skin: Skin, slit: Slit) -> tuple[Margins, Margins] | None:
 def find_margins(surface: Surface, slit: Slit, places: Places, sides: Array, *, shape: Array | None = None,
                  guide: Array | None = None) -> Margins | None:
     """Return the edges of a slit of the skin, or None where it has none: corners, or an edge's landmarks, are missing,
-    or both edges are one, as on a face with painted lids.
+    both edges are one, as on a face with painted lids, or no way along the skin is near the landmarks.
 
     places: landmark -> vertices (3,) and weights (3,). sides: `side_fields`. guide (2, g, 3): curves for the edges, in
     the coordinates ``shape`` (n, 3); without, smooth curves through the landmarks, in the surface's own.
@@ -104,7 +106,7 @@ def find_margins(surface: Surface, slit: Slit, places: Places, sides: Array, *, 
             return None
         line = _curve(at[stops]) if guide is None else guide[edge]
         path = _way(surface, at, stops, line, up * sign)
-        if path is None:
+        if path is None or _lengths(surface.vertices[path])[-1] > _LONGEST * _lengths(surface.vertices[stops])[-1]:
             return None
         paths.append(path)
         lines.append(_resampled(at[path], _GUIDE))

@@ -23,9 +23,10 @@ from facegen.transfer.closing import closing
 from facegen.transfer.eyeball import EyeFront
 from facegen.transfer.keep_apart import Contact, keep_apart
 from facegen.transfer.landmarks import Landmarks
-from facegen.transfer.margins import LIDS, LIPS
+from facegen.transfer.margins import LIDS, LIPS, Slit
 from facegen.transfer.piece_motion import PieceMotion, RigidMotions
 from facegen.transfer.pieces import Piece, face_names, find_pieces
+from facegen.transfer.sides import painted
 from facegen.transfer.skin import METHODS, Skin, lay_skin
 from facegen.transfer.skin_mesh import skin_mesh
 from facegen.transfer.solve import Weights
@@ -83,11 +84,14 @@ def transfer(mesh: Mesh, landmarks: Landmarks, template: Template, *, method: st
     motion = np.zeros((len(template.names), len(vertices), 3))
     motion[:, rows] = skin.motion(method, weights)
     contacts: Mapping[str, Contact] = {}
+    notes = tidy.notes
     if method == "landmarks":
         solid = [replace(piece, faces=tidy.numbers) if piece.kind == "skin" else piece for piece in found]
         moved = PieceMotion(solid, vertices, tidy.wound(faces), places)
         fronts = {f"eye_{s}": EyeFront(ball, vertices[moved.rows(f"eye_{s}")]) for s, ball in moved.eyes.items()}
-        slits = [slit for slit in (closing(skin, slit, fronts.get(slit.name)) for slit in (*LIDS, LIPS)) if slit]
+        found_slits = {slit: closing(skin, slit, fronts.get(slit.name)) for slit in (*LIDS, LIPS)}
+        slits = [one for one in found_slits.values() if one]
+        notes += tuple(_no_opening(slit) for slit, one in found_slits.items() if not one and _expected(slit, skin))
         _on_skin(motion, rows, [slit.close for slit in slits])
         jaw = None if skin.jaw is None else RigidMotions.of(lambda at: skin.jaw.movement(at, template.jaw))
         motion = moved.move(motion, jaw, template.gaze)
@@ -100,7 +104,20 @@ def transfer(mesh: Mesh, landmarks: Landmarks, template: Template, *, method: st
             result[row] -= motion[other]
     back = frame.inverse()
     shapes = {name: back.apply_vectors(result[row][own]) for row, name in enumerate(template.names)}
-    return Transferred(shapes, frame, skin, found, contacts, tidy.notes)
+    return Transferred(shapes, frame, skin, found, contacts, notes)
+
+
+def _expected(slit: Slit, skin: Skin) -> bool:
+    """Return whether landmarks say that there is a slit: of both faces, and not both edges on one place."""
+    names = {*slit.corners, slit.upper[len(slit.upper) // 2], slit.lower[len(slit.lower) // 2]}
+    return (names <= skin.places.keys() and names <= skin.template.places.keys()
+            and slit.side not in painted(skin.surface, skin.places, skin.sides))
+
+
+def _no_opening(slit: Slit) -> str:
+    what = "the lips" if slit is LIPS else f"the {'left' if slit.name.endswith('L') else 'right'} eye's lids"
+    return (f"no opening was found between {what} where the landmarks are: they close or part no more than the skin "
+            "round them moves")
 
 
 def _on_skin(motion: NDArray, rows: NDArray, steps: Sequence[Callable[[NDArray], None]]) -> None:

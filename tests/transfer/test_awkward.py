@@ -12,8 +12,9 @@ from facegen.face.face import load_face
 from facegen.fileio.avatar import load_avatar
 from facegen.fileio.obj import load_obj
 from facegen.geometry.mesh import Mesh
+from facegen.geometry.operators import Surface
 from facegen.transfer.landmarks import check_places, load_landmarks
-from facegen.transfer.margins import LIDS, LIPS, facing_margins
+from facegen.transfer.margins import LIDS, LIPS, facing_margins, find_margins
 from facegen.transfer.rig import _shipped
 from facegen.transfer.skin_mesh import skin_mesh
 from facegen.transfer.template import template_of
@@ -272,3 +273,23 @@ def test_landmarks_of_a_face_on_a_ball_are_refused(plain, tmp_path, capsys):
     assert "miss the surface" in told
     assert "Traceback" not in told
     assert out.read_bytes() == b"old"
+
+
+def test_an_edge_that_goes_round_the_head_is_none():
+    """Where skin without lids has no side, the way above an eye went round the head; a blink moved all of that."""
+    a, b = np.meshgrid(np.arange(20) * np.pi / 10, np.linspace(0.05, np.pi - 0.05, 15))
+    ball = 60 * np.stack([np.sin(b) * np.sin(a), np.cos(b), np.sin(b) * np.cos(a)], -1).reshape(-1, 3)
+    k = np.arange(14 * 20)
+    after = k - k % 20 + (k + 1) % 20
+    faces = np.concatenate([np.stack([k, k + 20, after], 1), np.stack([after, k + 20, after + 20], 1)])
+    surface = Surface(ball, faces.astype(np.int32))
+    places = {}
+    for name, (x, y) in {"eye_inner_L": (0, 0), "eye_outer_L": (57, 0), "eye_upper_L": (18, 13),
+                         "eye_lower_L": (18, -13)}.items():
+        near = int(np.linalg.norm(ball - [x, y, np.sqrt(3600 - x * x - y * y)], axis=1).argmin())
+        places[name] = (np.full(3, near), np.array([1.0, 0.0, 0.0]))
+    flat = {"shape": np.zeros_like(ball), "guide": np.zeros((2, 5, 3))}             # laid on one place: no way is long
+    right = np.sign(ball[:, 1:2]) * [0.0, 1.0, 0.0]
+    assert find_margins(surface, LIDS[0], places, right, **flat) is not None
+    wall = np.isin(np.arange(len(ball)) % 20, (2, 3))[:, None]
+    assert find_margins(surface, LIDS[0], places, np.where(wall, [0.0, -1.0, 0.0], right), **flat) is None
