@@ -19,6 +19,9 @@ _TRIED = 12
 _FIRST = 3
 # Because a triangle with a side of more than this many typical sides would be missed by its middle alone.
 _LARGE = 2.0
+# Labels of two places contradict each other where their product is below this. Because the edges of closed lips, a
+# tenth of a millimetre apart, have labels of a quarter with opposite signs, and a cheek beside them has less.
+_CONTRADICTION = -0.01
 _TINY = 1e-300
 
 
@@ -60,7 +63,7 @@ class ClosestPoints:
 
         normals (p, 3): only triangles whose normal has more than ``least_cosine`` with it are allowed (Onizuka 2018,
         section 4.2: within 90 degrees, so that the two lips are not confused). labels: numbers of the points (p, k)
-        and of the triangles (m, k); a triangle is allowed where no product of two is below minus a quarter - the
+        and of the triangles (m, k); a triangle is allowed where no product of two is below `_CONTRADICTION`: the
         signs say on which side of a slit a place lies.
         """
         points = np.asarray(points, float)
@@ -71,7 +74,7 @@ class ClosestPoints:
         if normals is not None:
             allowed &= np.einsum("pi,pki->pk", normals, self.surface.normals[near]) > least_cosine
         if labels is not None:
-            allowed &= (labels[0][:, None, :] * labels[1][near] > -0.25).all(axis=2)
+            allowed &= (labels[0][:, None, :] * labels[1][near] > _CONTRADICTION).all(axis=2)
         weights, feet = np.zeros((len(points), k, 3)), np.zeros((len(points), k, 3))
         distance = np.full((len(points), k), np.inf)
 

@@ -26,8 +26,8 @@ Array = NDArray[np.float64]
 
 # Places whose gap on the template is below this, mm, are corners: they close as their neighbours do.
 _CORNER = 0.15
-# What the template closes counts in full from this share of the gap on.
-_LEAST_CLOSING = 0.1
+# What the template closes, or opens wider, counts in full from this share of the gap on.
+_LEAST_CHANGE = 0.1
 # Millimetres: lips farther apart than this at some place have parted there.
 _PARTED = 1.0
 # Millimetres: a miss of this size counts half; on a faithful copy there is none to mend.
@@ -66,6 +66,10 @@ class Closing:
     rest: Array
     eye: EyeFront | None
     wanted: _Wanted
+
+    def closes(self) -> NDArray[np.bool_]:
+        """Return which shapes (k,) shut the slit."""
+        return self.wanted.shut.any(axis=1)
 
     def close(self, motion: Array) -> None:
         """Add to the displacements (k, n, 3) of the skin what they miss, in place."""
@@ -172,11 +176,10 @@ def _told_lids(gap: Array, upper: Array, lower: Array, own_gap: Array, part: Arr
     ratio = ratio[:, open_at[np.abs(np.arange(SAMPLES)[:, None] - open_at).argmin(axis=1)]]
     across = moved - ratio[:, :, None] * gap
     target = ratio[:, :, None] * own_gap + across @ part.T
-    active = smooth_step((1.0 - ratio) / _LEAST_CLOSING)
+    active = smooth_step(np.abs(1.0 - ratio) / _LEAST_CHANGE)
     shut = (ratio <= _SHUT) & (np.linalg.norm(target, axis=2) <= _SHUT_MM) & (active > 0)
-    down = np.maximum(-(upper * toward).sum(axis=2), 0.0).sum(axis=1)
-    up = np.maximum((lower * toward).sum(axis=2), 0.0).sum(axis=1)
-    share = np.where(down + up > _TINY, down / np.maximum(down + up, _TINY), 0.5)
+    ways = [np.abs((edge * toward).sum(axis=2)).sum(axis=1) for edge in (upper, lower)]
+    share = np.where(sum(ways) > _TINY, ways[0] / np.maximum(sum(ways), _TINY), 0.5)
     return _Wanted(target, active, share, shut)
 
 

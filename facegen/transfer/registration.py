@@ -50,9 +50,6 @@ _HOLD = 1e2
 _LEAST_COSINE = 0.1
 # Because a place beyond the template's border has its nearest place on the border: this far in mm, it has no partner.
 _PAST = 1.0
-# Because sides have faded in the depth of a mouth, and are sides still: this much counts as fully above or below. The
-# inside of a thin lip would else find its partners on the other lip.
-_SIDED = 0.3
 
 
 class Correspondence:
@@ -63,7 +60,7 @@ class Correspondence:
         self.template = template
         self._search = ClosestPoints(template)
         self.sides, self._painted = sides, painted
-        self._face_sides = _plainly(sides[template.faces].mean(axis=1))
+        self._face_sides = sides[template.faces].mean(axis=1)
         _edges, of_side = template.edges
         border = template.border_edges
         self._border_side = border[of_side].reshape(-1, 3)
@@ -75,17 +72,13 @@ class Correspondence:
     def __call__(self, points: NDArray, normals: NDArray, sides: NDArray, *, reach: float,
                  least_cosine: float = _LEAST_COSINE) -> Feet:
         """Return the feet; those beyond reach (mm) or on the template's border count as none."""
-        feet = self._search(points, normals, least_cosine=least_cosine, labels=(_plainly(sides), self._face_sides))
+        feet = self._search(points, normals, least_cosine=least_cosine, labels=(sides, self._face_sides))
         beyond = ~(feet.distances <= reach)
         on_side = feet.weights[:, [2, 0, 1]] < 1e-9         # no weight of the corner opposite side k
         beyond |= feet.found & (on_side & self._border_side[feet.faces]).any(axis=1) & (feet.distances > _PAST)
         if self._painted:
             beyond |= feet.found & torn(sides, self._face_sides[feet.faces], self._painted)
         return Feet(np.where(beyond, -1, feet.faces), feet.weights, feet.points, feet.distances)
-
-
-def _plainly(sides: NDArray) -> NDArray[np.float64]:
-    return np.clip(sides / _SIDED, -1.0, 1.0)
 
 
 def register(surface: Surface, sides: NDArray, landmarks: sparse.csr_array, targets: NDArray,

@@ -79,6 +79,7 @@ def rig(avatar: str | Path, output: str | Path, *, landmarks: str | Path | None 
     template = _template(tuple(recipes.items()))
     found = transfer(source.mesh, places, template, method=method, opening=opening, pieces=pieces)
     shapes = {name: found.shapes[name] for name in recipes}
+    shapes |= {half_name(name): moved for name, moved in found.halves.items()}
     expressions = {name: {name: 1.0} for name, recipe in recipes.items() if recipe.set == "vrm"}
     notes = _notes(source, places.points(source.mesh.vertices), found, recipes)
     written = save_avatar(source, output, shapes, notes=notes, normals=normals, quantise=quantise,
@@ -89,6 +90,11 @@ def rig(avatar: str | Path, output: str | Path, *, landmarks: str | Path | None 
 @lru_cache(maxsize=1)         # many avatars with the same shapes; a template is tens of megabytes
 def _template(recipes: tuple[tuple[str, Recipe], ...]) -> Template:
     return template_of(load_face(), dict(recipes))
+
+
+def half_name(shape: str) -> str:
+    """Return what the corrective of a shape half way is called in a file."""
+    return f"{shape}_half"
 
 
 def _is_vrm(source: AvatarFile) -> bool:
@@ -111,5 +117,6 @@ def _notes(source: AvatarFile, points: Mapping[str, np.ndarray], found: Transfer
         **({"neck": points["neck"].tolist()} if "neck" in points else {}),
         "sets": sorted({recipe.set for recipe in recipes.values()}),
         "shapes": {name: {"set": recipe.set} for name, recipe in recipes.items()},
+        **({"halves": {name: half_name(name) for name in found.halves}} if found.halves else {}),
         "pieces": kinds,
     }

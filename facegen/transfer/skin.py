@@ -132,7 +132,7 @@ class Skin:
         middles = self.correspondence(shape.corners.mean(axis=1), shape.normals, sides[surface.faces].mean(axis=1),
                                       reach=_REACH)
         matrices, turns = spread(self.parts, template.landmarks, registered)
-        return Transfer(surface, template.surface, feet, middles, matrices, turns, places, matrix, weights)
+        return Transfer(surface, template.surface, feet, middles, matrices, turns, places, matrix, weights, sides)
 
     def _bend(self, motion: NDArray, a: NDArray, b: NDArray) -> NDArray[np.float64]:
         """Return how far the motion of the middles of sides a-b is from the mean of their ends', at most, mm."""

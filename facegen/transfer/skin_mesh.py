@@ -6,7 +6,7 @@ None of this changes what the skin is. The file keeps what it has; only the solv
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -50,8 +50,8 @@ class SkinMesh:
         faces[self.turned] = faces[self.turned][:, ::-1]
         return faces
 
-    def carry(self, motion: NDArray) -> None:
-        """Let what hangs on edges go with them: displacements (k, all, 3), in place."""
+    def carry(self, motion: Iterable[NDArray]) -> None:
+        """Let what hangs on edges go with them: displacements (all, 3) of several shapes, in place."""
         for moved in motion if len(self.hanging) else ():
             moved[self.hanging] = self.hang @ moved
 

@@ -21,6 +21,7 @@ from facegen.transfer.alignment import Similarity, align
 from facegen.transfer.baselines import PaperWeights
 from facegen.transfer.closing import closing
 from facegen.transfer.eyeball import EyeFront
+from facegen.transfer.halfway import halfway
 from facegen.transfer.keep_apart import Contact, keep_apart
 from facegen.transfer.landmarks import Landmarks
 from facegen.transfer.margins import LIDS, LIPS, Slit
@@ -43,13 +44,15 @@ _FARTHEST = 1e30
 class Transferred:
     """``shapes``: name -> displacement (n, 3) of the avatar's own vertices, in its own axes and units. ``frame``: from
     there to the template's. ``skin``, ``pieces``: what the avatar was taken for; ``contacts``: how far eyes and teeth
-    went through the skin before and after they were kept apart, mm. ``warnings``: what was odd about the mesh."""
+    went through the skin before and after they were kept apart, mm. ``halves``: shape -> its corrective half way, see
+    `halfway`. ``warnings``: what was odd about the mesh."""
 
     shapes: Mapping[str, NDArray]
     frame: Similarity
     skin: Skin
     pieces: tuple[Piece, ...]
     contacts: Mapping[str, Contact]
+    halves: Mapping[str, NDArray]
     warnings: tuple[str, ...] = ()
 
 
@@ -85,6 +88,7 @@ def transfer(mesh: Mesh, landmarks: Landmarks, template: Template, *, method: st
     motion[:, rows] = skin.motion(method, weights)
     contacts: Mapping[str, Contact] = {}
     notes = tidy.notes
+    halves: Mapping[int, NDArray] = {}
     if method == "landmarks":
         solid = [replace(piece, faces=tidy.numbers) if piece.kind == "skin" else piece for piece in found]
         moved = PieceMotion(solid, vertices, tidy.wound(faces), places)
@@ -97,14 +101,19 @@ def transfer(mesh: Mesh, landmarks: Landmarks, template: Template, *, method: st
         motion = moved.move(motion, jaw, template.gaze)
         motion, contacts = keep_apart(moved, motion, template.gaze)
         _on_skin(motion, rows, [slit.seal for slit in slits])
+        lids = [slit for slit in slits if slit.eye is not None]
+        still = ~(template.jaw.any(axis=1) | template.gaze.any(axis=1))
+        halves = halfway(moved, lids, rows, motion, still)
     tidy.carry(motion)
+    tidy.carry(halves.values())
     result = motion.copy()
     for row, other in enumerate(template.minus):
         if other >= 0:
             result[row] -= motion[other]
     back = frame.inverse()
     shapes = {name: back.apply_vectors(result[row][own]) for row, name in enumerate(template.names)}
-    return Transferred(shapes, frame, skin, found, contacts, notes)
+    bent = {template.names[k]: back.apply_vectors(one[own]) for k, one in halves.items()}
+    return Transferred(shapes, frame, skin, found, contacts, bent, notes)
 
 
 def _expected(slit: Slit, skin: Skin) -> bool:
