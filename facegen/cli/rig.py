@@ -24,11 +24,14 @@ Pieces = Annotated[list[str] | None, typer.Option(
     "--piece", metavar="PART=KIND", help="What a part is (skin, eye_L, teeth_upper, skull, carried ...); repeatable.")]
 NoNormals = Annotated[bool, typer.Option("--no-normals", help="Leave out how normals change: half the size.")]
 Quantise = Annotated[bool, typer.Option("--quantise", help="Two bytes a number instead of four.")]
+NoCache = Annotated[bool, typer.Option(
+    "--no-cache", help="Lay the skin on the template anew, and do not keep that for the next time.")]
 
 
 def rig(avatar: Avatar, output: Out = None, landmarks: Marks = None, sets: Sets = "units,arkit,visemes",
         person: PersonName = None, method: Method = "landmarks", opening: Opening = 1.0, piece: Pieces = None,
-        no_normals: NoNormals = False, quantise: Quantise = False, json: Json = False, quiet: Quiet = False) -> None:
+        no_normals: NoNormals = False, quantise: Quantise = False, no_cache: NoCache = False, json: Json = False,
+        quiet: Quiet = False) -> None:
     """Give an avatar the expressions as blendshapes.
 
     For example: facegen rig cat.obj --landmarks cat.yaml -o cat.glb
@@ -46,7 +49,7 @@ def rig(avatar: Avatar, output: Out = None, landmarks: Marks = None, sets: Sets 
 
     names = [name.strip() for name in sets.split(",") if name.strip()]
     made = make(avatar, output, landmarks=landmarks, sets=names, person=person, method=method, opening=opening,
-                pieces=given, normals=not no_normals, quantise=quantise)
+                pieces=given, normals=not no_normals, quantise=quantise, cache=not no_cache)
     if not quiet:
         warn(made.warnings)
     if json:

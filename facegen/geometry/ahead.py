@@ -7,6 +7,8 @@ from numpy.typing import NDArray
 
 # Because a triangle that the axis lies in covers nothing.
 _TINY = 1e-300
+# Because a triangle as large as a head among fine ones must not fill the memory: it is cut into so many cells a side.
+_MOST_CELLS = 64
 
 
 def ahead(places: NDArray, corners: NDArray) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
@@ -15,28 +17,46 @@ def ahead(places: NDArray, corners: NDArray) -> tuple[NDArray[np.float64], NDArr
     far, which = np.full(len(places), np.inf), np.full(len(places), -1)
     if not len(corners) or not len(places):
         return far, which
+    p, t = _over(places[:, :2], corners[:, :, :2])
     a, ab, ac = corners[:, 0], corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
     det = ab[:, 0] * ac[:, 1] - ab[:, 1] * ac[:, 0]
-    upright = np.abs(det) > _TINY
-    det = np.where(upright, det, np.inf)
-    b, c = corners[:, 1], corners[:, 2]
-    low, high = np.minimum(np.minimum(a, b), c), np.maximum(np.maximum(a, b), c)    # quicker than min(axis=1)
-    # Triangles in the order of their left ends: those over a place begin at most the widest one's width before it.
-    order = np.argsort(low[:, 0], kind="stable")
-    starts = low[order, 0]
-    first = np.searchsorted(starts, places[:, 0] - (high - low)[:, 0].max())
-    count = np.searchsorted(starts, places[:, 0], side="right") - first
-    p = np.repeat(np.arange(len(places)), count)
-    t = order[np.arange(len(p)) - np.repeat(np.cumsum(count) - count, count) + np.repeat(first, count)]
-    x, y = places[p, 0], places[p, 1]
-    near = (x <= high[t, 0]) & (y >= low[t, 1]) & (y <= high[t, 1]) & upright[t]
-    p, t = p[near], t[near]
+    det = np.where(np.abs(det) > _TINY, det, np.inf)
     d = places[p, :2] - a[t, :2]
     v = (d[:, 0] * ac[t, 1] - d[:, 1] * ac[t, 0]) / det[t]
     w = (ab[t, 0] * d[:, 1] - ab[t, 1] * d[:, 0]) / det[t]
-    over = (v >= 0) & (w >= 0) & (v + w <= 1)
+    over = (v >= 0) & (w >= 0) & (v + w <= 1) & np.isfinite(det[t])
     p, t, v, w = p[over], t[over], v[over], w[over]
     depth = a[t, 2] + v * ab[t, 2] + w * ac[t, 2] - places[p, 2]
     rising = np.argsort(depth, kind="stable")       # the farthest is written last
     far[p[rising]], which[p[rising]] = depth[rising], t[rising]
     return far, which
+
+
+def _over(places: NDArray, corners: NDArray) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Return pairs of places (p, 2) and triangles (t, 3, 2) whose boxes they lie in, as rows of both.
+
+    By cells as large as a triangle's mean box: a triangle stands in the list of every cell that its box touches.
+    """
+    a, b, c = np.moveaxis(corners, 1, 0)
+    low, high = np.minimum(np.minimum(a, b), c), np.maximum(np.maximum(a, b), c)        # quicker than min(axis=1)
+    near = np.flatnonzero(((high >= places.min(axis=0)) & (low <= places.max(axis=0))).all(axis=1))
+    if not len(near):
+        return near, near
+    low, high = low[near], high[near]
+    start, extent = low.min(axis=0), high - low
+    size = max(float(extent.mean()), float(extent.max()) / _MOST_CELLS, _TINY)
+    first, last, own = (np.floor((at - start) / size).astype(np.int64) for at in (low, high, places))
+    rows, count = last[:, 1].max() + 1, (last - first + 1).prod(axis=1)
+    t = np.repeat(np.arange(len(near)), count)
+    step = np.arange(len(t)) - np.repeat(np.cumsum(count) - count, count)
+    across, up = np.divmod(step, (last - first + 1)[t, 1])
+    cell = (first[t, 0] + across) * rows + first[t, 1] + up
+    order = np.argsort(cell, kind="stable")
+    inside = np.flatnonzero((own[:, 1] >= 0) & (own[:, 1] < rows))
+    key = own[inside, 0] * rows + own[inside, 1]
+    begin = np.searchsorted(cell[order], key)
+    count = np.searchsorted(cell[order], key, side="right") - begin
+    p = np.repeat(inside, count)
+    t = t[order[np.arange(len(p)) - np.repeat(np.cumsum(count) - count, count) + np.repeat(begin, count)]]
+    within = ((places[p] >= low[t]) & (places[p] <= high[t])).all(axis=1)
+    return p[within], near[t[within]]

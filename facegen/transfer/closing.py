@@ -42,6 +42,8 @@ _ON_THE_BALL = 1.25
 _LIFTED, _OUT = 0.15, 0.02
 # The middle of a triangle with sides s lies nearer to the eye than its corners: sqrt(1 - s^2 / 3), at most so much.
 _MOST_SAG = 0.3
+# What counts less than this is rounding: most shapes leave a slit as it is.
+_NOTHING = 1e-9
 _TINY = 1e-300
 
 
@@ -73,10 +75,12 @@ class Closing:
 
     def close(self, motion: Array) -> None:
         """Add to the displacements (k, n, 3) of the skin what they miss, in place."""
-        wanted = self.wanted
+        wanted, gap = self.wanted, self.margins.gap(self.rest)
         for k in np.flatnonzero(wanted.active.max(axis=1) > 0):
-            missing = wanted.active[k, :, None] * (wanted.gap[k] - self.margins.gap(self.rest + motion[k]))
+            missing = wanted.active[k, :, None] * (wanted.gap[k] - gap - self.margins.gap(motion[k]))
             counts = _beyond(missing)
+            if counts.max() < _NOTHING:
+                continue
             missing = missing * counts[:, None]
             share = wanted.upper_share[k]
             self._move(motion[k], self.field.steps(share * missing, (share - 1.0) * missing))
@@ -93,18 +97,19 @@ class Closing:
             step += (share * _beyond(away, _ROLLS))[:, None] * away
         return step
 
-    def seal(self, motion: Array) -> None:
-        """Bring edges that are shut onto one line, no nearer to the eye than either, in place."""
+    def seal(self, motion: Array, rows: NDArray[np.int64]) -> None:
+        """Bring edges that are shut onto one line, no nearer to the eye than either, in displacements (k, all, 3) of
+        vertices of which ``rows`` (n,) are the skin's, in place."""
         shut = self.wanted.shut
         for k in np.flatnonzero(shut.any(axis=1)):
-            upper, lower = self.margins.ends(self.rest + motion[k])
+            upper, lower = self.margins.ends(self.rest + motion[k, rows])
             line = (upper + lower) / 2
             if self.eye is not None:
                 centre = self.eye.ball.centre
                 farther = np.maximum(*(np.linalg.norm(edge - centre, axis=1) for edge in (upper, lower)))
                 line = centre + farther[:, None] * _unit(line - centre)
             on = (shut[k] * _beyond(upper - lower - self.wanted.gap[k]))[:, None]
-            motion[k, self.field.rows] += self.field.steps(on * (line - upper), on * (line - lower))
+            motion[k, rows[self.field.rows]] += self.field.steps(on * (line - upper), on * (line - lower))
 
     @cached_property
     def _at_rest(self) -> Array:

@@ -242,13 +242,14 @@ class _Lips:
         margin = _LIP_TRAVEL * self._height
         close = ((corners.max(axis=1) > at.min(axis=0) - margin) & (corners.min(axis=1) < at.max(axis=0) + margin))
         faces = self._faces[close[:, :2].all(axis=1)]
-        skin = np.unique(faces)
+        skin, local = np.unique(faces, return_inverse=True)
+        local = local.reshape(-1, 3)
         moves = np.any(motion[:, skin] != 0, axis=(1, 2)) | np.any(motion[:, own] != 0, axis=(1, 2))
         for k in np.flatnonzero(moves):
             given = 0.0
             for step in range(_ROUNDS + 1):
                 places = (self._rest[own] + motion[k, own]) @ self._axes.T
-                now, which = ahead(places, (self._rest + motion[k])[faces] @ self._axes.T)
+                now, which = ahead(places, ((self._rest[skin] + motion[k, skin]) @ self._axes.T)[local])
                 through = (which >= 0) & (now > -_THROUGH * self._height)
                 missing = np.where(through, np.maximum(least - now - allowed[k], 0.0), 0.0)
                 after[k] = missing.max()

@@ -32,6 +32,8 @@ _NARROW = 0.7
 _WRONG_SIDE = 20.0
 # An edge this many times as long as the line through its landmarks goes round something else: there is no slit.
 _LONGEST = 2.5
+# Millimetres on the template: no way leads farther round the guide than this.
+_BESIDE = 20.0
 # A guide is sampled at so many places.
 _GUIDE = 200
 
@@ -141,7 +143,9 @@ def _curve(stops: Array) -> Array:
 def _way(surface: Surface, at: Array, stops: NDArray, line: Array, side: Array) -> NDArray | None:
     """Return the vertices of the cheapest way along edges from stop to stop, or None where there is none."""
     edges, _ = surface.edges
-    middle = at[edges].mean(axis=1)
+    middle = (at[edges[:, 0]] + at[edges[:, 1]]) / 2
+    near = ((middle > line.min(axis=0) - _BESIDE) & (middle < line.max(axis=0) + _BESIDE)).all(axis=1)
+    edges, middle = edges[near], middle[near]
     off, _ = cKDTree(line).query(middle)
     length = np.linalg.norm(at[edges[:, 0]] - at[edges[:, 1]], axis=1) + 1e-6
     length = length * (1 + (off / _NARROW) ** 2) * np.where(side[edges].min(axis=1) < 0, _WRONG_SIDE, 1.0)

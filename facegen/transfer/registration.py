@@ -61,9 +61,10 @@ class Correspondence:
         self._search = ClosestPoints(template)
         self.sides, self._painted = sides, painted
         self._face_sides = sides[template.faces].mean(axis=1)
-        _edges, of_side = template.edges
+        edges, of_side = template.edges
         border = template.border_edges
         self._border_side = border[of_side].reshape(-1, 3)
+        self._border_corner = np.isin(template.faces, edges[border])
 
     def nearest(self, points: NDArray) -> Feet:
         """Return the nearest places of all, whatever their normals."""
@@ -75,7 +76,9 @@ class Correspondence:
         feet = self._search(points, normals, least_cosine=least_cosine, labels=(sides, self._face_sides))
         beyond = ~(feet.distances <= reach)
         on_side = feet.weights[:, [2, 0, 1]] < 1e-9         # no weight of the corner opposite side k
-        beyond |= feet.found & (on_side & self._border_side[feet.faces]).any(axis=1) & (feet.distances > _PAST)
+        on_border = (on_side & self._border_side[feet.faces]) | \
+            ((feet.weights > 1 - 1e-9) & self._border_corner[feet.faces])
+        beyond |= feet.found & on_border.any(axis=1) & (feet.distances > _PAST)
         if self._painted:
             beyond |= feet.found & torn(sides, self._face_sides[feet.faces], self._painted)
         return Feet(np.where(beyond, -1, feet.faces), feet.weights, feet.points, feet.distances)
@@ -92,7 +95,7 @@ def register(surface: Surface, sides: NDArray, landmarks: sparse.csr_array, targ
     n = len(surface.vertices)
     smooth, stay = hinge_energy(surface), dirichlet(surface)
     area = np.maximum(surface.vertex_areas, 1e-6 * surface.vertex_areas.mean())
-    x = surface.vertices.copy()
+    x, factor = surface.vertices.copy(), None
     for step in steps:
         for _ in range(step.repeat):
             pull = np.zeros(n)
@@ -108,6 +111,6 @@ def register(surface: Surface, sides: NDArray, landmarks: sparse.csr_array, targ
             matrix = energy + sparse.diags_array(pull + floor) + hold * (landmarks.T @ landmarks)
             right = pull[:, None] * (goal - surface.vertices)
             right += hold * (landmarks.T @ (targets - landmarks @ surface.vertices))
-            u = Factor(matrix, what="the registration of the avatar").solve(right)
-            x = surface.vertices + u
+            factor = Factor(matrix, what="the registration of the avatar", spent=factor)
+            x = surface.vertices + factor.solve(right)
     return x

@@ -14,6 +14,7 @@ from facegen.data import meshes_dir
 from facegen.errors import FileError, InputError, nearest
 from facegen.face.face import load_face
 from facegen.fileio.avatar import AvatarFile, check_output, load_avatar, save_avatar
+from facegen.fileio.kept import kept_in
 from facegen.transfer.landmarks import check_places, load_landmarks
 from facegen.transfer.pieces import describe
 from facegen.transfer.template import Template, template_of
@@ -51,13 +52,15 @@ def avatar_names() -> tuple[str, ...]:
 def rig(avatar: str | Path, output: str | Path, *, landmarks: str | Path | None = None,
         sets: Sequence[str] = DEFAULT_SETS, person: str | Path | None = None, method: str = "landmarks",
         opening: float = 1.0, pieces: Mapping[str, str] | None = None, normals: bool = True,
-        quantise: bool = False) -> Rigged:
+        quantise: bool = False, cache: bool = True) -> Rigged:
     """Give an avatar blendshapes and write it.
 
     avatar: the path of a .obj, .glb, .gltf, .vrm, .ply or .stl file, or a shipped avatar's name. output: .glb (or
     .gltf, .vrm), .npz, or a folder for a sequence of OBJ files. landmarks: their file; a shipped avatar has its own.
     sets: vocabularies, see `shape_sets`. person: whose habits override expressions. method, opening, pieces: as in
-    `transfer`. normals, quantise: as in `save_avatar`. Raises InputError and its children; nothing is written then. ::
+    `transfer`. normals, quantise: as in `save_avatar`. cache: use again how the skin was laid on the template, kept in
+    the user's cache folder, if avatar, landmarks and pieces are the same. Raises InputError and its children; nothing
+    is written then. ::
 
         facegen.rig("cat.obj", "cat.glb", landmarks="cat.yaml")
         facegen.load_face("cat.glb").pose("happiness")
@@ -77,7 +80,8 @@ def rig(avatar: str | Path, output: str | Path, *, landmarks: str | Path | None 
     places = load_landmarks(marks, source.mesh, mesh_name=path.name, digest=source.digest)
     warnings = tuple(check_places(places, source.mesh))
     template = _template(tuple(recipes.items()))
-    found = transfer(source.mesh, places, template, method=method, opening=opening, pieces=pieces)
+    found = transfer(source.mesh, places, template, method=method, opening=opening, pieces=pieces,
+                     kept=kept_in("registrations") if cache else None)
     shapes = {name: found.shapes[name] for name in recipes}
     shapes |= {half_name(name): moved for name, moved in found.halves.items()}
     expressions = {name: {name: 1.0} for name, recipe in recipes.items() if recipe.set == "vrm"}

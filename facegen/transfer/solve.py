@@ -41,6 +41,8 @@ _STAY = 0.3
 # But a lining, which is without a partner too, moves as the skin over it does, so that it does not come through: wholly
 # where that skin is no thicker than the first, not at all from the second on, mm.
 _THIN, _THICK = 5.0, 20.0
+# Shapes that are solved together, to bound the memory.
+_AT_A_TIME = 16
 # Millimetres over which the trust in a partner fades.
 _FADE = 6.0
 
@@ -124,9 +126,14 @@ class Transfer:
     def solve(self, motion: NDArray) -> NDArray[np.float64]:
         """Return the avatar's displacements (k, n, 3) for the template's (k, n_s, 3)."""
         n, n_s = self._shape
-        k = len(motion)
-        right = self._right @ np.ascontiguousarray(motion.reshape(k, 3 * n_s).T)            # (3 n, k)
-        return np.ascontiguousarray(np.moveaxis(self._factor.solve(right.reshape(n, 3 * k)).reshape(n, 3, k), 2, 0))
+        result = np.empty((len(motion), n, 3))
+        for start in range(0, len(motion), _AT_A_TIME):
+            some = motion[start:start + _AT_A_TIME]
+            k = len(some)
+            right = self._right @ np.ascontiguousarray(some.reshape(k, 3 * n_s).T)          # (3 n, k)
+            solved = self._factor.solve(right.reshape(n, 3 * k))
+            result[start:start + k] = np.moveaxis(solved.reshape(n, 3, k), 2, 0)
+        return result
 
 
 def rotation_between(a: NDArray, b: NDArray) -> NDArray[np.float64]:

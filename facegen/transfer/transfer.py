@@ -7,13 +7,14 @@ pieces as what they are, and back.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from facegen.errors import InputError, nearest
+from facegen.fileio.kept import Kept
 from facegen.geometry.closest import ClosestPoints
 from facegen.geometry.mesh import Mesh
 from facegen.geometry.operators import Surface
@@ -58,13 +59,13 @@ class Transferred:
 
 def transfer(mesh: Mesh, landmarks: Landmarks, template: Template, *, method: str = "landmarks",
              weights: Weights | PaperWeights | None = None, opening: float = 1.0,
-             pieces: Mapping[str, str] | None = None) -> Transferred:
+             pieces: Mapping[str, str] | None = None, kept: Kept | None = None) -> Transferred:
     """Return the template's shapes on an avatar.
 
     mesh: the avatar, in any axes and units. landmarks: on it. method: "landmarks" (ours), or a published one to compare
     with: "sumner", "cloning". weights: of the energies; `PAPER` holds the paper's. opening: a factor on how far the jaw
-    opens. pieces: part, material or number of a component -> kind. Raises InputError for what cannot be used: unknown
-    names, a mesh that cannot be solved.
+    opens. pieces: part, material or number of a component -> kind. kept: where registrations are kept and found again.
+    Raises InputError for what cannot be used: unknown names, a mesh that cannot be solved.
     """
     if method not in METHODS:
         raise InputError(f"method: expected {', '.join(METHODS)}, got {method!r}{nearest(str(method), METHODS)}")
@@ -83,35 +84,36 @@ def transfer(mesh: Mesh, landmarks: Landmarks, template: Template, *, method: st
     own_faces = np.concatenate([piece.faces for piece in found if piece.kind == "skin"])
     tidy = skin_mesh(vertices, faces[own_faces], own_faces, places)
     rows, surface = tidy.rows, tidy.surface
-    skin = lay_skin(template, surface, _skin_places(landmarks, own, rows, surface, places, template), opening=opening)
-    motion = np.zeros((len(template.names), len(vertices), 3))
-    motion[:, rows] = skin.motion(method, weights)
+    skin = lay_skin(template, surface, _skin_places(landmarks, own, rows, surface, places, template), opening=opening,
+                    kept=kept)
+    on_skin = skin.motion(method, weights)
     contacts: Mapping[str, Contact] = {}
     notes = tidy.notes
     halves: Mapping[int, NDArray] = {}
-    if method == "landmarks":
+    if method != "landmarks":
+        motion = _among_all(on_skin, rows, len(vertices))
+    else:
         solid = [replace(piece, faces=tidy.numbers) if piece.kind == "skin" else piece for piece in found]
         moved = PieceMotion(solid, vertices, tidy.wound(faces), places)
         fronts = {f"eye_{s}": EyeFront(ball, vertices[moved.rows(f"eye_{s}")]) for s, ball in moved.eyes.items()}
         found_slits = {slit: closing(skin, slit, fronts.get(slit.name)) for slit in (*LIDS, LIPS)}
         slits = [one for one in found_slits.values() if one]
         notes += tuple(_no_opening(slit) for slit, one in found_slits.items() if not one and _expected(slit, skin))
-        _on_skin(motion, rows, [slit.close for slit in slits])
+        for slit in slits:
+            slit.close(on_skin)
         jaw = None if skin.jaw is None else RigidMotions.of(lambda at: skin.jaw.movement(at, template.jaw))
-        motion = moved.move(motion, jaw, template.gaze)
+        motion = moved.move(_among_all(on_skin, rows, len(vertices)), jaw, template.gaze)
         motion, contacts = keep_apart(moved, motion, template.gaze)
-        _on_skin(motion, rows, [slit.seal for slit in slits])
+        for slit in slits:
+            slit.seal(motion, rows)
         lids = [slit for slit in slits if slit.eye is not None]
         still = ~(template.jaw.any(axis=1) | template.gaze.any(axis=1))
         halves = halfway(moved, lids, rows, motion, still)
     tidy.carry(motion)
     tidy.carry(halves.values())
-    result = motion.copy()
-    for row, other in enumerate(template.minus):
-        if other >= 0:
-            result[row] -= motion[other]
-    back = frame.inverse()
-    shapes = {name: back.apply_vectors(result[row][own]) for row, name in enumerate(template.names)}
+    back, shapes = frame.inverse(), {}
+    for name, shape, other in zip(template.names, motion, template.minus, strict=True):
+        shapes[name] = back.apply_vectors(shape if other < 0 else shape - motion[other])[own]
     bent = {template.names[k]: back.apply_vectors(one[own]) for k, one in halves.items()}
     return Transferred(shapes, frame, skin, found, contacts, bent, notes)
 
@@ -129,12 +131,11 @@ def _no_opening(slit: Slit) -> str:
             "round them moves")
 
 
-def _on_skin(motion: NDArray, rows: NDArray, steps: Sequence[Callable[[NDArray], None]]) -> None:
-    """Apply steps that change the skin's displacements (k, rows, 3) in place."""
-    skin = motion[:, rows]
-    for step in steps:
-        step(skin)
-    motion[:, rows] = skin
+def _among_all(on_skin: NDArray, rows: NDArray, n: int) -> NDArray[np.float64]:
+    """Return the displacements (k, n, 3) of all vertices, where those in ``rows`` are the skin's."""
+    motion = np.zeros((len(on_skin), n, 3))
+    motion[:, rows] = on_skin
+    return motion
 
 
 def _skin_places(landmarks: Landmarks, own: NDArray, rows: NDArray, surface: Surface, places: Mapping[str, NDArray],

@@ -15,6 +15,7 @@ from scipy.spatial.transform import Rotation
 
 from facegen.errors import InputError
 from facegen.face.face import load_face
+from facegen.geometry.ahead import _over
 from facegen.transfer.eyeball import fit_eye, gaze_rotation
 from facegen.transfer.keep_apart import keep_apart
 from facegen.transfer.piece_motion import PieceMotion, RigidMotions
@@ -404,3 +405,17 @@ def test_an_avatar_of_skin_alone():
     out, found = keep_apart(moves, moves.move(motion, identity(2), np.ones((2, 4))), np.ones((2, 4)))
     assert not found["mouth"].before.any()
     np.testing.assert_array_equal(out[:, moves.rows("skin")], motion[:, moves.rows("skin")])
+
+
+@pytest.mark.parametrize("largest", [0.1, 1.0, 500.0])
+def test_cells_find_the_triangles_over_a_place_that_trying_all_finds(largest):
+    rng = np.random.default_rng(7)
+    sizes = rng.uniform(0.01, 0.1, (400, 1, 1))
+    sizes[0] = largest
+    corners = rng.uniform(0, 5, (400, 1, 2)) + sizes * rng.normal(size=(400, 3, 2))
+    places = np.concatenate([rng.uniform(-1, 6, (300, 2)), corners[5]])         # some beside all, some on corners
+    p, t = _over(places, corners)
+    low, high = corners.min(axis=1), corners.max(axis=1)
+    slow = ((places[:, None] >= low) & (places[:, None] <= high)).all(axis=2)
+    assert sorted(zip(p.tolist(), t.tolist(), strict=True)) == [tuple(pair) for pair in np.argwhere(slow).tolist()]
+    assert all(len(rows) == 0 for rows in _over(places + 1e4, corners))
