@@ -9,36 +9,61 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from clay import Clay, curve
+from clay import Clay, curve, mirrored
 from numpy.typing import ArrayLike, NDArray
 from sheet import Sheet
 
 
-def lip_rows(slit: NDArray, clay: Clay, offsets: Sequence[float], *, gap: float) -> list[NDArray]:
+def lip_rows(
+    slit: NDArray,
+    clay: Clay,
+    offsets: Sequence[float],
+    *,
+    gap: float,
+    out: NDArray | None = None,
+    rim: Sequence[tuple[float, float]] = (),
+    sunk: float = 0.0,
+    inner: Sequence[tuple[float, float]] = (),
+) -> list[NDArray]:
     """Return rows (2 k + 1, 3) round a slit (k + 1, 3), which runs from the middle to the left corner.
 
-    The first rows lie ``offsets`` away from the slit on the skin, the largest first; the last is the slit itself, its
-    lips ``gap`` apart.
+    The first rows lie ``offsets`` away from the slit on the skin, the largest first; then those of the rounded rim, each
+    (away from the slit, behind the skin); then the slit itself, ``sunk`` behind the skin, its lips ``gap`` apart; then
+    those on the inner side. out: ways out of the mouth (k + 1, 3), unit; the skin's normals if not given.
     """
     k = len(slit) - 1
     along = np.gradient(slit, axis=0)
     along[0] = (1.0, 0.0, 0.0)
     along /= np.linalg.norm(along, axis=1, keepdims=True)
-    normal = clay.normals(slit)
+    normal = clay.normals(slit) if out is None else np.array(out)
     normal[0, 0] = 0.0
     up = np.cross(normal, along)
     up /= np.linalg.norm(up, axis=1, keepdims=True)
     # Towards the corner the rows fan out round it.
     fan = 0.9 * (np.arange(k) / k)[:, None] ** 5
-    rows = []
-    for d in offsets:
-        upper, lower = (slit[:k] + d * (sign * np.cos(fan) * up[:k] + np.sin(fan) * along[:k]) for sign in (1, -1))
-        row = clay.onto(np.concatenate([upper, slit[k:] + d * along[k:], lower[::-1]]))
-        row[[0, -1], 0] = 0.0
-        rows.append(row)
+
+    def row(d: float, depth: float = 0.0) -> NDArray:
+        line = slit - depth * normal
+        upper, lower = (line[:k] + d * (sign * np.cos(fan) * up[:k] + np.sin(fan) * along[:k]) for sign in (1, -1))
+        return np.concatenate([upper, line[k:] + d * along[k:], lower[::-1]])
+
     taper = np.sqrt(1 - (np.arange(k) / k) ** 2)[:, None]
     half = gap / 2 * np.array([0.0, 1.0, 0.0]) * taper
-    return [*rows, np.concatenate([slit[:k] + half, slit[k:], (slit[:k] - half)[::-1]])]
+    line = slit - sunk * normal
+    rows = [
+        *(clay.onto(row(d)) for d in offsets),
+        *(row(*one) for one in rim),
+        np.concatenate([line[:k] + half, line[k:], (line[:k] - half)[::-1]]),
+        *(row(*one) for one in inner),
+    ]
+    for one in rows:
+        one[[0, -1], 0] = 0.0
+    return rows
+
+
+def arch(*left: tuple[float, float, float]) -> NDArray:
+    """Return an arch (2 k - 1, 3) from its left half (k places), the middle last."""
+    return np.concatenate([left, mirrored(left[-2::-1])])
 
 
 def gum_and_teeth(
@@ -49,15 +74,16 @@ def gum_and_teeth(
     teeth: Sequence[tuple[float, float, float, float]],
     *,
     lean: float = 0.0,
+    points: int = 13,
 ) -> Sheet:
     """Return a row of teeth on a gum that runs along an arch (k, 3), symmetrical: from the left end to the right one.
 
     down: direction in which the teeth grow. gum: thickness. teeth: (place along the arch 0..1, width, depth, length)
-    each; lean: how far tips stand forwards, in lengths.
+    each; lean: how far tips stand forwards, in lengths. points: rings of the gum.
     """
     sheet = Sheet(part)
     down = np.asarray(down, float) / np.linalg.norm(down)
-    path = curve(arch, 13)
+    path = curve(arch, points)
     along = np.gradient(path, axis=0)
     along /= np.linalg.norm(along, axis=1, keepdims=True)
     out = np.cross(down, along)
