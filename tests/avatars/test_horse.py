@@ -1,10 +1,8 @@
 """The horse that ships: its files are what its script writes; its lids, its lips and its long jaw are well made."""
 
-from collections import Counter
-
 import numpy as np
 import pytest
-from authored import AVATARS, check_script, part
+from authored import AVATARS, check_script, crossings, edges, part
 from scipy import sparse
 from scipy.sparse.csgraph import connected_components
 
@@ -42,7 +40,7 @@ def test_it_has_separate_parts_and_a_colour_for_each_material(mesh):
 
 def test_the_skin_is_one_oriented_manifold_with_two_eyes_and_a_neck(mesh):
     skin = part(mesh, "skin")
-    count = Counter((int(a), int(b)) for face in skin for a, b in zip(face, np.roll(face, -1), strict=True))
+    count = edges(skin)
     assert max(count.values()) == 1, "two triangles run along a side in one direction"
     border = np.array([edge for edge in count if edge[::-1] not in count])
     n = len(mesh.vertices)
@@ -55,11 +53,16 @@ def test_the_skin_is_one_oriented_manifold_with_two_eyes_and_a_neck(mesh):
     assert (corners[:, 0] * np.cross(corners[:, 1], corners[:, 2])).sum() > 0, "it faces outwards"
 
 
-def test_no_triangle_of_the_skin_is_a_sliver(mesh):
-    corners = mesh.vertices[part(mesh, "skin")]
+def test_no_triangle_of_the_skin_is_a_sliver_and_none_cuts_another_or_an_eye(mesh):
+    skin = part(mesh, "skin")
+    corners = mesh.vertices[skin]
     doubled = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
     longest = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
     assert (doubled / longest).min() > 0.3, "heights of triangles, millimetres on a head of half a metre"
+    assert crossings(mesh.vertices, skin, skin) == []
+    for name in ("eye_L", "eye_R"):
+        eye = part(mesh, name)
+        assert crossings(mesh.vertices, skin, eye) + crossings(mesh.vertices, eye, skin) == []
 
 
 @pytest.mark.parametrize("side", ["L", "R"])

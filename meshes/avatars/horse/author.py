@@ -60,8 +60,8 @@ CANDIDATES = 16000
 OPENING = almond(LID, 53, 40, 33, point=0.35, inner_drop=6, lean=0.10)
 LID_RINGS = {"offsets": (0.38, 0.22, 0.11, 0.04), "crest": 1.05, "inside": 1.02, "pocket": 1.4}
 # The white of the face, seen square to it: half of its outline, (x, z).
-BLAZE = ((0.0, 2.2), (0.3, 2.6), (0.55, 3.2), (0.5, 3.9), (0.4, 5.0), (0.36, 7.0), (0.42, 8.6), (0.46, 9.5), (0.4, 9.9),
-         (0.27, 10.2), (0.0, 10.45))
+BLAZE = ((0.0, 2.2), (0.3, 2.6), (0.55, 3.2), (0.5, 3.9), (0.4, 5.0), (0.36, 7.0), (0.42, 8.6), (0.44, 9.5), (0.38, 9.9),
+         (0.2, 10.25), (0.0, 10.35))
 # Where the muzzle pales, in steps: (z at these heights, what begins there).
 HEIGHTS = (-3.0, -1.6, -0.6, 0.4, 1.4)
 MUZZLE = (((6.6, 6.7, 7.2, 8.1, 8.6), "coat_pale"), ((7.1, 7.2, 7.7, 8.6, 9.1), "muzzle_edge"),
@@ -71,9 +71,9 @@ MUZZLE = (((6.6, 6.7, 7.2, 8.1, 8.6), "coat_pale"), ((7.1, 7.2, 7.7, 8.6, 9.1), 
 def spacing(points: NDArray) -> NDArray:
     """Return the length of edges at points (n, 3): fine round the features, coarse at the back."""
     features = np.array([model.EYE.on_ball(np.zeros((1, 2)))[0], model.NOSTRIL, (1.0, -1.2, 9.4), (0, -1.2, 10.9)])
-    reach = np.array([1.1, 0.5, 0.7, 0.7])
+    reach = np.array([1.1, 0.8, 0.7, 0.7])
     away = np.linalg.norm(points[:, None] - features, axis=2) - reach
-    coarse = np.clip(0.2 + 0.16 * np.maximum(away.min(axis=1), 0), 0.2, 0.72)
+    coarse = np.clip(0.19 + 0.17 * np.maximum(away.min(axis=1), 0), 0.19, 0.72)
     x, y, z = points.T
     return np.where((x < 0.9) & (y > 0) & (z > 2) & (z < 9.9), np.minimum(coarse, 0.38), coarse)
 
@@ -129,6 +129,7 @@ def head(clay: Clay) -> Sheet:
     loops = {"eye": lids[0], "mouth": mouth[0], "ear": model.EAR.loop(clay), "nostril": nostril_loop(clay),
              "neck": neck_loop(clay)}
     plan = Plan(clay, model.CHART, model.REACH, spacing, loops)
+    plan.add_points(on_top(clay, np.array([BLAZE[-1]])))
     plan.add_middle(-90, 270)
     plan.add_edge(on_top(clay, curve(np.array(BLAZE), 300)))
     for edge, _ in MUZZLE:
@@ -182,12 +183,12 @@ def landmarks(clay: Clay) -> dict[str, NDArray]:
         "nose_tip": on(0.0, 0.5, 11.0),
         "nose_bridge": on(0.0, 1.7, 5.2),
         "nose_wing_L": on(1.4, -0.1, 10.3),
-        "nose_base": on(0.0, -0.05, 11.3),
+        "nose_base": on(0.0, 0.0, 11.3),
         "mouth_corner_L": edge[m],
-        "mouth_top": rows[0][0],
+        "mouth_top": on(0.0, -0.55, 11.3),
         "mouth_inner_top": edge[0],
         "mouth_inner_bottom": edge[-1],
-        "mouth_bottom": rows[0][-1],
+        "mouth_bottom": on(0.0, -1.9, 10.9),
         "mouth_upper_L": edge[m // 2],
         "mouth_lower_L": edge[2 * m - m // 2],
         "chin": on(0.0, -2.5, 9.6),

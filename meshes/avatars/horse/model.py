@@ -51,20 +51,20 @@ EAR = Ear(
     foot=(0.52, 0.42, 0.45),
 )
 # The crest of the neck, from the poll down, about.
-CREST = ((0.0, 1.1, -1.5), (0.0, 0.4, -2.4), (0.0, -1.0, -3.4), (0.0, -3.2, -4.0), (0.0, -5.8, -4.5))
+CREST = ((0.0, 0.9, -1.2), (0.0, 0.2, -2.1), (0.0, -1.2, -3.0), (0.0, -3.2, -3.7), (0.0, -5.8, -4.4))
 
 
 def clay() -> Clay:
     """Return the head without ears."""
     c = Clay()
     c.add(ball((0, -0.2, 1.6), (1.8, 1.75, 2.0)))  # skull
-    c.add(stroke([(0, -0.9, -0.8), (0, -3.2, -1.8), (0, -9.0, -2.5)], [2.0, 2.1, 2.7], (0.65, 1, 1)), 1.2)  # neck
+    c.add(stroke([(0, -1.0, -0.5), (0, -3.2, -1.6), (0, -9.0, -2.4)], [1.75, 2.0, 2.7], (0.68, 1, 1)), 1.2)  # neck
     c.add(stroke([(0, -1.2, 1.8), (0, -3.4, -0.3)], 1.5, (0.85, 1, 1)), 0.8)  # throat
     c.add(ball((0, 0.55, 3.0), (2.0, 1.2, 2.0)), 0.8)  # forehead
     c.add(stroke([(0, 0.35, 3.2), (0, -0.1, 9.6)], [1.4, 1.02]), 0.8)  # nose
     c.add(stroke([(0, -0.7, 3.8), (0, -0.75, 8.6)], [1.5, 0.9]), 0.9)  # teeth's roots
     c.add(stroke([(0, 1.0, 4.0), (0, 0.45, 9.6)], [0.62, 0.5], (1.3, 1, 1)), 0.6)  # its flat ridge
-    c.add(ball((1.0, -1.65, 2.35), (1.0, 2.0, 2.1)), 0.6, pair=True)  # cheeks
+    c.add(ball((1.0, -1.75, 2.4), (1.0, 2.1, 2.2)), 0.6, pair=True)  # cheeks
     c.add(stroke([(0.75, -2.3, 3.2), (0.45, -1.5, 9.0)], [0.9, 0.52]), 0.9, pair=True)  # lower jaw
     c.add(stroke([(1.62, -0.5, 5.2), (1.4, -0.3, 7.0)], [0.2, 0.1]), 0.7, pair=True)  # ridge of the cheekbone
     c.add(ball((0, -0.45, 9.9), (1.3, 1.05, 1.2)), 0.8)  # muzzle
@@ -74,7 +74,7 @@ def clay() -> Clay:
     c.add(stroke([(1.45, 0.3, 4.3), (1.2, 0.1, 6.2)], [0.3, 0.2]), 0.5, pair=True)  # before the eye
     c.add(ball(EYE.centre, EYE.radius * 1.08), 0.35, pair=True)  # lids
     c.add(stroke([(1.15, 1.25, 4.4), (1.62, 1.45, 3.5), (1.75, 1.05, 2.6)], [0.22, 0.3, 0.2]), 0.6, pair=True)  # brow
-    c.add(stroke([(0.7, 0.55, 10.35), (1.22, 0.25, 10.3), (1.4, -0.3, 10.4), (1.0, -0.6, 10.8)],
-                 [0.18, 0.24, 0.26, 0.16]), 0.4, pair=True)  # wings of the nostrils
+    c.add(stroke([(0.7, 0.55, 10.35), (1.18, 0.25, 10.25), (1.3, -0.25, 10.35), (0.98, -0.55, 10.75)],
+                 [0.2, 0.28, 0.32, 0.2]), 0.5, pair=True)  # wings of the nostrils
     c.carve(stroke([NOSTRIL - 0.2 * NOSTRIL_AXES[0], NOSTRIL + 0.2 * NOSTRIL_AXES[0]], [0.12, 0.2]), 0.3, pair=True)
     return c

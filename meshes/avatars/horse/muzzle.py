@@ -22,8 +22,8 @@ OFFSETS = (0.5, 0.36, 0.23, 0.12)
 RIM = ((0.045, 0.035),)
 SUNK = 0.1
 INNER = ((0.02, 0.19), (0.06, 0.28), (0.13, 0.36), (0.24, 0.42), (0.4, 0.46))
-# The mouth behind the lips narrows to the throat: (z, height of its middle, half width, half height).
-LINING = ((7.3, -1.15, 0.9, 0.62), (6.0, -1.2, 0.88, 0.66), (4.8, -1.3, 0.75, 0.6))
+# The mouth behind the lips narrows to the throat: (z, height of its middle, half widths above and below, half height).
+LINING = ((7.3, -1.18, 0.88, 0.64, 0.56), (6.0, -1.22, 0.88, 0.66, 0.58), (4.8, -1.3, 0.75, 0.6, 0.5))
 THROAT = (0.0, -1.4, 4.3)
 
 
@@ -49,16 +49,22 @@ def add_mouth(sheet: Sheet, loop: NDArray, rows: list[NDArray]) -> None:
         name = "muzzle" if number < len(OFFSETS) - 1 else "lips" if number < EDGE + 3 else "mouth"
         sheet.band(last, row, name, closed=False)
         last = row
-    turn = np.pi / 2 * (1 - np.arange(2 * LIP + 1) / LIP)
-    flat = np.stack([np.cos(turn), np.sin(turn), 0 * turn], axis=1)
-    flat[[0, -1], 0] = 0.0
-    ovals = [np.array([0.0, y, z]) + flat * [w, h, 0.0] for z, y, w, h in LINING]
+    ovals = [_oval(*oval) for oval in LINING]
     for ring in (0.65 * rows[-1] + 0.35 * ovals[0], 0.3 * rows[-1] + 0.7 * ovals[0], *ovals):
         ring = sheet.row(ring)
         sheet.band(last, ring, "mouth", closed=False)
         last = ring
     back = sheet.row(THROAT)[0]
     sheet.triangles([(a, b, back) for a, b in pairwise(last)], "mouth")
+
+
+def _oval(z: float, y: float, above: float, below: float, high: float) -> NDArray:
+    """Return a row (2 LIP + 1, 3) of the lining, square to the face, from the middle of the palate to the floor's."""
+    turn = np.pi / 2 * (1 - np.arange(2 * LIP + 1) / LIP)
+    wide = np.where(turn < 0, above + (below - above) * np.sin(turn) ** 2, above)
+    x = wide * np.cos(turn)
+    x[[0, -1]] = 0.0
+    return np.stack([x, y + high * np.sin(turn), np.full(len(turn), z)], axis=1)
 
 
 def nostril_loop(clay: Clay, size: float = 1.0) -> NDArray:
@@ -99,14 +105,14 @@ def inner_parts() -> list[Mesh]:
     """Return teeth on their gums, and the tongue."""
     upper = arch((0.62, -0.62, 4.9), (0.66, -0.66, 6.6), (0.6, -0.68, 8.2), (0.52, -0.7, 9.2), (0.62, -0.72, 9.9),
                  (0.42, -0.72, 10.35), (0, -0.72, 10.5))
-    lower = arch((0.56, -1.8, 4.9), (0.58, -1.78, 6.6), (0.52, -1.76, 8.2), (0.44, -1.72, 9.1), (0.54, -1.7, 9.75),
-                 (0.38, -1.7, 10.15), (0, -1.7, 10.3))
+    lower = arch((0.46, -1.66, 4.9), (0.48, -1.64, 6.6), (0.36, -1.58, 8.2), (0.28, -1.5, 9.0), (0.46, -1.58, 9.65),
+                 (0.37, -1.6, 10.1), (0, -1.6, 10.25))
     incisors, cheeks = (0.165, 0.5, 0.83), (7.9, 7.35, 6.8, 6.25, 5.7, 5.2)
     return [
         gum_and_teeth("teeth_upper", upper, (0, -1, 0), 0.17, _row(upper, incisors, cheeks, (0.4, 0.24, 0.5),
                       (0.5, 0.36, 0.44)), lean=0.12, points=25).mesh(),
-        gum_and_teeth("teeth_lower", lower, (0, 1, 0), 0.15, _row(lower, incisors, cheeks, (0.37, 0.22, 0.5),
-                      (0.5, 0.3, 0.5)), lean=0.2, points=25).mesh(),
+        gum_and_teeth("teeth_lower", lower, (0, 1, 0), 0.11, _row(lower, incisors, cheeks, (0.37, 0.22, 0.42),
+                      (0.5, 0.3, 0.44)), lean=0.2, points=25).mesh(),
         tongue("tongue", [(0, -1.8, 5.0), (0, -1.45, 6.6), (0, -1.42, 8.4), (0, -1.5, 9.8)],
                [0.34, 0.42, 0.42, 0.38, 0.36, 0.38, 0.36, 0.22], [0.28, 0.26, 0.22, 0.2, 0.17, 0.14, 0.11, 0.06]
                ).mesh(),

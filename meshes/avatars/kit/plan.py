@@ -13,6 +13,8 @@ from numpy.typing import NDArray
 
 # Steps of an edge that are longer than so many spacings are gaps in it.
 _GAP = 1.7
+# Places nearer than this are one.
+_SAME = 1e-6
 
 
 class Plan:
@@ -41,21 +43,32 @@ class Plan:
             out &= ~inside(loop, d)
         return out
 
+    def add_points(self, points: NDArray) -> None:
+        """Add places (n, 3) on the clay that must be vertices."""
+        self.fixed = np.concatenate([self.fixed, points])
+
     def add_middle(self, start: float, stop: float) -> None:
         """Add points along x = 0 between two angles in degrees, from the front upwards."""
         turn = np.radians(np.linspace(start, stop, 1500))
         line = self.chart.shoot(self.clay, np.stack([0 * turn, np.sin(turn), np.cos(turn)], axis=1), self.reach)
         line[:, 0] = 0.0
-        self.fixed = np.concatenate([self.fixed, walk(line[self.outside(line)], self.spacing, self.fixed)])
+        self.add_points(walk(line[self.outside(line)], self.spacing, self.fixed))
 
     def add_edge(self, line: NDArray) -> None:
-        """Add points of a dense line (n, 3) on the clay and wish for edges between them."""
+        """Add points of a dense line (n, 3) on the clay and wish for edges between them.
+
+        A line that ends at a vertex is joined to it.
+        """
+        ends = [np.flatnonzero(np.linalg.norm(self.fixed - place, axis=1) < _SAME) for place in line[[0, -1]]]
         line = line[self.outside(line)]
         line = line[line[:, 0] > 0.5 * self.spacing(line)]
         edge = walk(line, self.spacing, self.fixed)
+        first = len(self.fixed)
         near = np.linalg.norm(np.diff(edge, axis=0), axis=1) < _GAP * self.spacing(edge[:-1])
-        self.lines += [(len(self.fixed) + i, len(self.fixed) + i + 1) for i in np.flatnonzero(near)]
-        self.fixed = np.concatenate([self.fixed, edge])
+        self.lines += [(first + i, first + i + 1) for i in np.flatnonzero(near)]
+        for end, row in zip(ends, (first, first + len(edge) - 1), strict=True):
+            self.lines += [(row, int(i)) for i in end]
+        self.add_points(edge)
 
     def covered(self, candidates: int) -> tuple[NDArray, NDArray]:
         """Return (vertices, faces), the loops' vertices first; free points are chosen from so many candidates."""
