@@ -49,7 +49,7 @@ def avatars() -> NDArray[np.uint8]:
     """Return the shipped avatars in rows: neutral and four poses."""
     rows = []
     with tempfile.TemporaryDirectory() as folder:
-        for name in ("human", "cartoon", "cat"):
+        for name in ("human", "cartoon", "cat", "horse"):
             path = rig(name, f"{folder}/{name}.glb", sets=["units", "expressions"]).path
             face = load_face(path)
             rows.append(strip([render(face, pose, size=SIZE, view=(20, 0))

@@ -1,11 +1,8 @@
 """The cartoon that ships: its files are what its script writes; lids, lips and what lies behind them are well made."""
 
-from collections import Counter
-from itertools import pairwise
-
 import numpy as np
 import pytest
-from authored import AVATARS, check_script, part
+from authored import AVATARS, check_script, crossings, edges, part
 from scipy import sparse
 from scipy.sparse.csgraph import connected_components
 
@@ -27,11 +24,6 @@ def marks(mesh):
     return load_landmarks(HERE / "landmarks.yaml", mesh, mesh_name="cartoon.obj")
 
 
-def edges(faces):
-    """Return directed edge -> how many triangles run along it."""
-    return Counter((int(a), int(b)) for face in faces for a, b in pairwise((*face, face[0])))
-
-
 def rims(faces):
     """Return the closed chains of edges with a triangle on one side only."""
     count = edges(faces)
@@ -43,27 +35,6 @@ def rims(faces):
             chain.append(after.pop(chain[-1]))
         chains.append(chain[:-1])
     return chains
-
-
-def crossings(vertices, ours, theirs):
-    """Return pairs (edge of ours, triangle of theirs) that cut through each other and share no vertex."""
-    sides = np.array(list({tuple(sorted(edge)) for edge in edges(ours)}))
-    corners = vertices[theirs]
-    low, high = corners.min(axis=1), corners.max(axis=1)
-    found = []
-    for a, b in sides:
-        p, q = vertices[a], vertices[b]
-        near = ((low <= np.maximum(p, q)) & (high >= np.minimum(p, q))).all(axis=1)
-        near &= ~np.isin(theirs, (a, b)).any(axis=1)
-        t = corners[near]
-        normal = np.cross(t[:, 1] - t[:, 0], t[:, 2] - t[:, 0])
-        above, below = (((end - t[:, 0]) * normal).sum(axis=1) for end in (p, q))
-        with np.errstate(divide="ignore", invalid="ignore"):
-            at = p + (above / (above - below))[:, None] * (q - p)
-        around = [(np.cross(t[:, (i + 1) % 3] - t[:, i], at - t[:, i]) * normal).sum(axis=1) > 0 for i in range(3)]
-        cut = (above * below < 0) & np.all(around, axis=0)
-        found += [((int(a), int(b)), tuple(face)) for face in theirs[near][cut].tolist()]
-    return found
 
 
 def test_the_script_writes_what_ships(tmp_path):

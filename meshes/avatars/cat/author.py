@@ -19,11 +19,13 @@ HERE = Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE.parent / "kit"))
 
 import model  # noqa: E402
-from clay import Clay, curve, mirrored  # noqa: E402
-from cover import cover, directions, in_polygon, inside, scatter, walk  # noqa: E402
+from chart import Round  # noqa: E402
+from clay import Clay, curve  # noqa: E402
+from cover import in_polygon  # noqa: E402
 from eyes import almond, ellipse, eyeball, lid_rings  # noqa: E402
-from mouth import gum_and_teeth, lip_rows, slit_at, tongue  # noqa: E402
+from mouth import arch, gum_and_teeth, slit_at, tongue, walked_lip_rows  # noqa: E402
 from numpy.typing import NDArray  # noqa: E402
+from plan import Plan  # noqa: E402
 from saving import both_sides, save_avatar  # noqa: E402
 from scipy.spatial import cKDTree  # noqa: E402
 from sheet import Sheet, mirror_image  # noqa: E402
@@ -54,9 +56,10 @@ COLOURS = {
 }
 LID = 28  # vertices round an eye
 LIP = 14  # quads along half a lip
-EAR = 20  # vertices round an ear
 GAP = 0.012  # between the lips
 DECIMALS = 4
+REACH = 9.0  # farther than any place from the head's middle
+CANDIDATES = 24000
 
 OPENING = almond(LID, 60, 39, 35, point=0.4, inner_drop=9, lean=0.10)
 LID_RINGS = {"offsets": (0.4, 0.2, 0.09), "edge": 0.07, "crest": 1.05, "inside": 1.02, "pocket": 1.4}
@@ -135,38 +138,6 @@ def spacing(points: NDArray) -> NDArray:
     return np.where(points[:, 2] > WHITE[0], np.minimum(size, 0.28 + 0.5 * beside_white), size)
 
 
-def ear_ring(height: float, count: int = EAR) -> NDArray:
-    """Return a ring of the left ear: a crescent, hollow towards the front, narrowing to the tip. height: 0 to 1."""
-    t = 2 * np.pi * np.arange(count) / count
-    axis, wide, front = model.EAR_AXES
-    narrow = 1 - height
-    width = 1.8 * narrow**0.75 * (1 + 0.2 * height)
-    hollow, thick = 0.85 * narrow**0.6, 0.2 * narrow**0.5
-    s = np.sin(t)
-    depth = -hollow * np.abs(s) ** 0.8 - np.where(s > 0, 0.0, thick * (0.6 + 0.4 * np.abs(s)))
-    depth[np.abs(s) < 1e-9] = -0.3 * thick
-    lean = (0.35 * height**2 - 0.25 * np.sin(np.pi * height)) * wide
-    return (
-        model.EAR_BASE
-        + height * model.EAR_HEIGHT * axis
-        + lean
-        + width * np.cos(t)[:, None] * wide
-        + depth[:, None] * front
-    )
-
-
-def ear_loop(clay: Clay) -> NDArray:
-    """Return the ring where the ear meets the head."""
-    t = 2 * np.pi * np.arange(EAR) / EAR
-    _, wide, front = model.EAR_AXES
-    flat = (
-        model.EAR_BASE
-        + 1.85 * np.cos(t)[:, None] * wide
-        + np.where(np.sin(t) > 0, 0.55, 1.0)[:, None] * np.sin(t)[:, None] * front
-    )
-    return clay.onto(flat)
-
-
 def nostril_loop(clay: Clay, size: float) -> NDArray:
     t = 2 * np.pi * np.arange(8) / 8
     x, y, z = model.NOSTRIL
@@ -192,29 +163,19 @@ def head(clay: Clay) -> Sheet:
     lids = lid_rings(model.EYE, clay, OPENING, **LID_RINGS)
     lips = mouth_rows(clay)
     nostril = nostril_loop(clay, 1.0)
-    loops = {"eye": lids[0], "mouth": lips[0], "ear": ear_loop(clay), "nostril": nostril, "neck": neck_loop(clay)}
-    fixed = np.concatenate(list(loops.values()))
-    ends = np.cumsum([0] + [len(x) for x in loops.values()])
-    rows = {name: np.arange(a, b) for name, a, b in zip(loops, ends[:-1], ends[1:], strict=True)}
-    middle = middle_line(clay, fixed, rows)
-    fixed = np.concatenate([fixed, middle])
-    lines: list[tuple[int, int]] = []
+    loops = {"eye": lids[0], "mouth": lips[0], "ear": model.EAR.loop(clay), "nostril": nostril, "neck": neck_loop(clay)}
+    plan = Plan(clay, Round(model.CENTRE), REACH, spacing, loops)
+    plan.add_middle(-85, 230)
     for _, least, outline in PATCHES:
-        edge = patch_edge(clay, outline, least, fixed, rows)
-        near = np.linalg.norm(np.diff(edge, axis=0), axis=1) < 1.7 * spacing(edge[:-1])
-        lines += [(len(fixed) + i, len(fixed) + i + 1) for i in np.flatnonzero(near)]
-        fixed = np.concatenate([fixed, edge])
-    d = directions(24000)
-    free = clay.shoot(model.CENTRE, d[d[:, 0] > 0], 9.0)
-    free = free[outside(free, fixed, rows)]
-    free = scatter(free, spacing, fixed)
-    vertices, faces = cover(clay, model.CENTRE, fixed, free, list(rows.values()), lines)
+        plan.add_edge(patch_edge(clay, outline, least))
+    vertices, faces = plan.covered(CANDIDATES)
+    rows = plan.rows
     sheet = Sheet("skin")
     sheet.row(vertices)
     sheet.triangles(faces, colours(vertices[faces].mean(axis=1)))
     add_lids(sheet, rows["eye"], lids)
     add_mouth(sheet, rows["mouth"], lips)
-    add_ear(sheet, rows["ear"])
+    model.EAR.add(sheet, rows["ear"], (0.1, 0.24, 0.4, 0.57, 0.74, 0.88), "fur", "inner_pink")
     rings = [nostril_loop(clay, 0.82) - [0, 0, 0.12], nostril_loop(clay, 0.6) - [-0.03, 0, 0.35]]
     last = rows["nostril"]
     for ring in rings:
@@ -225,37 +186,12 @@ def head(clay: Clay) -> Sheet:
     return sheet
 
 
-def middle_line(clay: Clay, fixed: NDArray, rows: dict[str, NDArray]) -> NDArray:
-    """Return points along x = 0, from the chin up the face and over the head to the nape."""
-    turn = np.radians(np.linspace(-85, 230, 1500))
-    line = clay.shoot(model.CENTRE, np.stack([0 * turn, np.sin(turn), np.cos(turn)], axis=1), 9.0)
-    line[:, 0] = 0.0
-    return walk(line[outside(line, fixed, rows)], spacing, fixed)
-
-
-def patch_edge(clay: Clay, outline: NDArray, least: float, fixed: NDArray, rows: dict[str, NDArray]) -> NDArray:
-    """Return points along the edge of a colour."""
+def patch_edge(clay: Clay, outline: NDArray, least: float) -> NDArray:
+    """Return a dense line on the clay along the edge of a colour."""
     corners = np.concatenate([outline, outline[:1]])
     flat = np.concatenate([a + np.linspace(0, 1, 12, endpoint=False)[:, None] * (b - a) for a, b in pairwise(corners)])
     flat = flat[(flat[:, 0] > 0.02) & (clay(np.column_stack([flat, np.full(len(flat), least)])) < -0.1)]
-    line = clay.shoot(np.column_stack([flat, np.full(len(flat), least)]), np.array([[0.0, 0.0, 1.0]]), 8.0)
-    line = line[outside(line, fixed, rows)]
-    line = line[line[:, 0] > 0.5 * spacing(line)]
-    return walk(line, spacing, fixed)
-
-
-def outside(points: NDArray, fixed: NDArray, rows: dict[str, NDArray]) -> NDArray[np.bool_]:
-    """Return which points lie in none of the loops."""
-    d = points - model.CENTRE
-    d /= np.linalg.norm(d, axis=1, keepdims=True)
-    out = np.ones(len(points), bool)
-    for row in rows.values():
-        loop = fixed[row] - model.CENTRE
-        loop /= np.linalg.norm(loop, axis=1, keepdims=True)
-        if np.abs(loop[0, 0]) < 1e-9:
-            loop = np.concatenate([loop, loop[::-1] * (-1, 1, 1)])
-        out &= ~inside(loop, d)
-    return out
+    return clay.shoot(np.column_stack([flat, np.full(len(flat), least)]), np.array([[0.0, 0.0, 1.0]]), 8.0)
 
 
 def colours(middles: NDArray) -> list[str]:
@@ -274,7 +210,7 @@ def add_lids(sheet: Sheet, loop: NDArray, rings: list[NDArray]) -> None:
 
 def mouth_rows(clay: Clay) -> list[NDArray]:
     """Return the rows of the left half of the lips, the outermost first."""
-    return lip_rows(slit_at(clay, model.MOUTH_LINE, LIP + 1, model.MOUTH_INSIDE), clay, LIP_OFFSETS, gap=GAP)
+    return walked_lip_rows(slit_at(clay, model.MOUTH_LINE, LIP + 1, model.MOUTH_INSIDE), clay, LIP_OFFSETS, gap=GAP)
 
 
 def add_mouth(sheet: Sheet, loop: NDArray, rows: list[NDArray]) -> None:
@@ -311,21 +247,6 @@ def lining_rows(edge: NDArray) -> list[NDArray]:
     return rows
 
 
-def add_ear(sheet: Sheet, loop: NDArray) -> None:
-    heights = (0.1, 0.24, 0.4, 0.57, 0.74, 0.88)
-    rings = [ear_ring(h) for h in heights]
-    # The foot of the ear swings from the head's surface into the crescent.
-    rings[0] = 0.55 * rings[0] + 0.45 * (sheet.at(loop) + heights[0] * model.EAR_HEIGHT * model.EAR_AXES[0])
-    t = 2 * np.pi * (np.arange(EAR) + 0.5) / EAR
-    last = loop
-    for number, ring in enumerate(rings):
-        ring = sheet.row(ring)
-        hollow = (np.sin(t) > 0) & (np.abs(np.cos(t)) < 0.93) & (number > 0)
-        sheet.band(last, ring, ["inner_pink" if x else "fur" for x in hollow])
-        last = ring
-    sheet.cap(last, "fur", ear_ring(0.99).mean(axis=0))
-
-
 def whiskers(clay: Clay) -> Sheet:
     sheet = Sheet("whiskers")
     for row in range(3):
@@ -345,11 +266,6 @@ def whiskers(clay: Clay) -> Sheet:
             sheet.cap(rows[0], "whiskers")
             sheet.cap(rows[-1], "whiskers")
     return sheet
-
-
-def arch(*left: tuple[float, float, float]) -> NDArray:
-    """Return an arch (2 k - 1, 3) from its left half (k places), the middle last."""
-    return np.concatenate([left, mirrored(left[-2::-1])])
 
 
 def inner_parts() -> list[Mesh]:

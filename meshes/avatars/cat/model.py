@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 from clay import Clay, ball, curve, rotation, stroke
+from ear import Ear, ear_axes
 from eyes import Eye
 
 # Midway between the eyes is (0, 0.55, 3.0): the origin lies inside the head, which is nine centimetres wide.
@@ -45,16 +46,15 @@ def clay() -> Clay:
     return c
 
 
-def _axes(axis, wide) -> np.ndarray:
-    axis, wide = np.asarray(axis, float), np.asarray(wide, float)
-    axis /= np.linalg.norm(axis)
-    wide -= (wide @ axis) * axis
-    wide /= np.linalg.norm(wide)
-    return np.stack([axis, wide, np.cross(wide, axis)])
-
-
 NOSTRIL = (0.34, -0.93, 4.95)
-EAR_BASE = np.array([2.45, 3.05, -0.7])
-EAR_HEIGHT = 3.7
-# Along the ear, across it (to its outer edge), and out of its hollow.
-EAR_AXES = _axes((0.40, 1.0, -0.06), (1.0, -0.3, -0.75))
+EAR = Ear(
+    base=np.array([2.45, 3.05, -0.7]),
+    axes=ear_axes((0.40, 1.0, -0.06), (1.0, -0.3, -0.75)),
+    height=3.7,
+    width=1.8,
+    hollow=0.85,
+    thickness=0.2,
+    profile=lambda h: (1 - h) ** 0.75 * (1 + 0.2 * h),
+    lean=lambda h: 0.35 * h**2 - 0.25 * np.sin(np.pi * h),
+    foot=(1.85, 0.55, 1.0),
+)

@@ -28,8 +28,7 @@ def ball(at: ArrayLike, radii: ArrayLike, turn: ArrayLike | None = None) -> Fiel
 
     def field(p: NDArray) -> NDArray:
         q = (p - at) @ axes.T
-        k0 = np.linalg.norm(q / radii, axis=-1)
-        k1 = np.linalg.norm(q / radii**2, axis=-1)
+        k0, k1 = _length(q / radii), _length(q / radii**2)
         return np.where(k1 > 0, k0 * (k0 - 1) / np.maximum(k1, 1e-12), -radii.min())
 
     return field
@@ -46,10 +45,14 @@ def stroke(points: ArrayLike, radii: ArrayLike, squash: ArrayLike = (1.0, 1.0, 1
             along = (b - a) / squash
             t = np.clip(((p - a) / squash) @ along / (along @ along), 0.0, 1.0)
             off = (p - a - t[..., None] * (b - a)) / squash
-            best = np.minimum(best, np.linalg.norm(off, axis=-1) - (r + t * (s - r)))
+            best = np.minimum(best, _length(off) - (r + t * (s - r)))
         return best * squash.min()
 
     return field
+
+
+def _length(vectors: NDArray) -> NDArray:
+    return np.sqrt(np.einsum("...i,...i->...", vectors, vectors))
 
 
 def mirrored(points: ArrayLike) -> NDArray:
@@ -108,8 +111,9 @@ class Clay:
         g = self.gradient(points)
         return g / np.maximum(np.linalg.norm(g, axis=-1, keepdims=True), 1e-9)
 
-    def onto(self, points: ArrayLike, level: float = 0.0, steps: int = _NEWTON_STEPS) -> NDArray:
-        """Return points (..., 3) moved onto the surface, or to a distance ``level`` outside it."""
+    def onto(self, points: ArrayLike, level: ArrayLike = 0.0, steps: int = _NEWTON_STEPS) -> NDArray:
+        """Return points (..., 3) moved onto the surface, or to a distance ``level`` (one, or (...)) outside
+        it."""
         p = np.array(points, float)
         for _ in range(steps):
             g = self.gradient(p)

@@ -1,6 +1,6 @@
 """Cover a model with triangles: loops and lines stay where they are put, free points spread out between them.
 
-The points, seen from one place inside, are triangulated on the sphere (their convex hull is the Delaunay
+The points, seen from inside by a chart, are triangulated on the sphere (their convex hull is the Delaunay
 triangulation), then edges are flipped until the triangles are Delaunay on the surface itself, and free points are
 moved to the middle of their neighbours. One half is covered; the other mirrors it.
 """
@@ -11,6 +11,7 @@ from collections import defaultdict
 from collections.abc import Callable, Sequence
 
 import numpy as np
+from chart import Chart
 from clay import Clay, mirrored
 from numpy.typing import NDArray
 from scipy.spatial import ConvexHull, cKDTree
@@ -82,7 +83,7 @@ def directions(count: int) -> NDArray:
 
 def cover(
     clay: Clay,
-    centre: NDArray,
+    chart: Chart,
     fixed: NDArray,
     free: NDArray,
     holes: Sequence[NDArray],
@@ -96,9 +97,8 @@ def cover(
     points = np.concatenate([fixed, free])
     right = np.flatnonzero(points[:, 0] > 0)
     all_points = np.concatenate([points, mirrored(points[right])])
-    d = all_points - centre
-    d /= np.linalg.norm(d, axis=1, keepdims=True)
-    edges = set(_middle_edges(points[: len(fixed)] - centre, holes))
+    d = chart.directions(all_points)
+    edges = set(_middle_edges(d[: len(fixed)], holes))
     for hole in holes:
         ahead = hole[1:] if (points[hole, 0] <= 0).any() else np.roll(hole, -1)
         edges |= {frozenset((int(a), int(b))) for a, b in zip(hole, ahead, strict=False)}
@@ -152,12 +152,17 @@ def recover(d: NDArray, faces: NDArray, edges: set[frozenset], *, required: bool
     def side(a: int, b: int, p: int) -> float:
         return float(np.cross(d[a], d[b]) @ d[p])
 
-    def cuts(p: int, q: int, a: int, b: int) -> bool:
-        return side(p, q, a) * side(p, q, b) < 0 and side(a, b, p) * side(a, b, q) < 0 and d[p] @ d[a] > 0.5
+    def cutting(a: int, b: int) -> list[frozenset]:
+        """Return the edges that cross the one from a to b."""
+        inner = [e for e, sides in beside.items() if len(sides) == 2]
+        p, q = np.array([tuple(e) for e in inner]).T
+        across = np.cross(d[a], d[b])
+        likely = ((d[p] @ across) * (d[q] @ across) < 0) & (d[p] @ d[a] > 0.5) & ~np.isin((p, q), (a, b)).any(axis=0)
+        return [e for e in (inner[i] for i in np.flatnonzero(likely)) if side(*e, a) * side(*e, b) < 0]
 
     for a, b in (sorted(e) for e in edges if not beside.get(e)):
         for _ in range(200):
-            crossing = [e for e, sides in beside.items() if len(sides) == 2 and not e & {a, b} and cuts(*e, a, b)]
+            crossing = cutting(a, b)
             if not crossing:
                 break
             for edge in crossing:
