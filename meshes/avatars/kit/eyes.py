@@ -122,6 +122,22 @@ def lid_rings(
     ]
 
 
+def eye_places(margin: NDArray, ball: Eye) -> dict[str, NDArray]:
+    """Return the left eye's landmarks: name -> place (3,). margin: the ring (k, 3) of the lids' margin, k / 4 whole."""
+    q = len(margin) // 4
+    return {
+        "eye_inner_L": margin[2 * q],
+        "eye_outer_L": margin[0],
+        "eye_upper_L": margin[q],
+        "eye_lower_L": margin[3 * q],
+        "eye_upper_outer_L": margin[q // 2],
+        "eye_upper_inner_L": margin[q + q // 2 + 1],
+        "eye_lower_inner_L": margin[2 * q + q // 2],
+        "eye_lower_outer_L": margin[3 * q + q // 2 + 1],
+        "eye_center_L": ball.on_ball(np.zeros((1, 2)))[0],
+    }
+
+
 def eyeball(part: str, eye: Eye, outlines: Sequence[NDArray], materials: Sequence[str], *, mirror: bool) -> Mesh:
     """Return an eyeball: rings at outlines (angles from the gaze, innermost first), then on to the back.
 
