@@ -20,8 +20,11 @@ from facegen.fileio.avatar import load_avatar
 from facegen.render import render_passes
 from facegen.transfer.margins import LIDS, LIPS, Slit, facing_margins
 from facegen.transfer.rig import avatar_names, rig
-from facegen.transfer.skin import METHODS, Skin
+from facegen.transfer.skin import METHODS as SKIN_METHODS
+from facegen.transfer.skin import Skin
 
+# The paper's is ours with its energy and its weights, on our registration, lids and pieces.
+METHODS = {**{method: {"method": method} for method in SKIN_METHODS}, "paper's weights": {"weights": "paper"}}
 ONE_SIDED = ("AU12_L", "AU10_L", "AU20_L", "AU2_L", "AU6_L", "AU15_L")
 VIEWS = ((0, 0), (25, 0), (-25, 0))
 # Millimetres in the template's shape: beside the midline, above the brows, behind the ears.
@@ -47,7 +50,7 @@ def eye_seen(path: Path) -> float:
 
 def measured(name: str, method: str, folder: Path) -> tuple[str, ...]:
     """Return the cells of a row."""
-    rigged = rig(name, folder / f"{name}-{method}.glb", sets=["units", "arkit"], method=method)
+    rigged = rig(name, folder / f"{name}-{method}.glb", sets=["units", "arkit"], **METHODS[method])
     avatar, frame, skin = load_avatar(rigged.path), rigged.found.frame, rigged.found.skin
     rows = cKDTree(frame.apply(avatar.mesh.vertices)).query(skin.surface.vertices)[1]
     shapes = {shape: frame.apply_vectors(moved[rows]) for shape, moved in avatar.shapes.items()}

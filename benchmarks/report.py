@@ -88,7 +88,8 @@ def text(measured: Measured, *, plotted: bool) -> str:
     race = {count: row for count, row in measured.triangles.items() if count in _TARGETS}
     whole = {detail: f"detail {detail}" for detail in measured.whole}
     parts = [
-        "# Benchmarks", _opening(measured), "## What it says", _reading(race, measured),
+        "# Benchmarks", "Of the renderers. How long avatars take, `python benchmarks/transfer.py`: "
+        "[transfer speed](transfer-speed.md).", _opening(measured), "## What it says", _reading(race, measured),
         "## A frame", "CPU milliseconds, median (least), of one picture of 512 x 512 pixels. CPU time is that of "
         "all threads of the process; the skin of the face is cut into as many triangles as said.",
         _table(race, lambda n: f"{n:,}", lambda r: f"{r.cpu:.1f} ({r.least:.1f})"),
@@ -156,8 +157,8 @@ def draw_plot(measured: Measured, path: Path) -> None:
 
 def _opening(measured: Measured) -> str:
     command = "python benchmarks/renderers.py" + (" --quick" if measured.quick else "")
-    lines = [f"`{command}`, {datetime.date.today().isoformat()}, on {_processor()}, {len(_cores())} cores, "
-             f"{platform.system()}, Python {platform.python_version()}; {', '.join(_versions())}; "
+    lines = [f"`{command}`, {datetime.date.today().isoformat()}, on {processor()}, {len(cores())} cores, "
+             f"{platform.system()}, Python {platform.python_version()}; {', '.join(versions())}; "
              f"OpenGL: {_driver(measured)}. Load of the machine before the run: {measured.load:.1f}."]
     if measured.quick:
         lines.append("**A quick run with few frames: its figures are rough.**")
@@ -221,28 +222,29 @@ def _table(rows: dict[int, Field], head: Callable[[int], str], cell: Callable[[R
              for name in _names(rows)]
     ratios = ["" if (rival := _fastest_peer(row, measure)) is None or not _ran(row, OURS)
               else f"{measure(row[rival]) / measure(row[OURS]):.1f} ({rival})" for row in rows.values()]
-    return _markdown(("renderer", *map(head, rows)), [*lines, ("*fastest peer / fast, 1 thread*", *ratios)])
+    return markdown(("renderer", *map(head, rows)), [*lines, ("*fastest peer / fast, 1 thread*", *ratios)])
 
 
 def _start_table(measured: Measured) -> str:
-    return _markdown(("renderer", "empty caches", "later"),
+    return markdown(("renderer", "empty caches", "later"),
                      [(label(name), *(("failed", "") if times is None else (f"{t:.2f}" for t in times)))
                       for name, times in measured.start.items()])
 
 
 def _frames_table(measured: Measured) -> str:
-    return _markdown(("renderer", "detail", "occlusion", "pose", "normals and picture", "frame", "frames a second"),
+    return markdown(("renderer", "detail", "occlusion", "pose", "normals and picture", "frame", "frames a second"),
                      [(f"facegen {name}", str(detail), occlusion, f"{1e3 * pose:.1f}", f"{1e3 * picture:.1f}",
                        f"{1e3 * (pose + picture):.1f}", f"{1 / (pose + picture):.0f}")
                       for (name, detail, occlusion), (pose, picture) in measured.frames.items()])
 
 
 def _poses_table(measured: Measured) -> str:
-    return _markdown(("what", "microseconds a pose", "poses a second"),
+    return markdown(("what", "microseconds a pose", "poses a second"),
                      [(what, f"{1e6 * s:.0f}", f"{1 / s:,.0f}") for what, s in measured.poses])
 
 
-def _markdown(head: Iterable[str], rows: Iterable[Iterable[str]]) -> str:
+def markdown(head: Iterable[str], rows: Iterable[Iterable[str]]) -> str:
+    """Return a table: the first column to the left, figures to the right."""
     head = list(head)
     body = [f"| {' | '.join(row)} |" for row in [head, ["---", *["---:"] * (len(head) - 1)], *map(list, rows)]]
     return "\n".join(body)
@@ -262,9 +264,10 @@ def _fastest_peer(row: Field, measure: Callable[[Result], float] = attrgetter("c
     return min((name for name in PEERS if _ran(row, name)), key=lambda name: measure(row[name]), default=None)
 
 
-def _versions() -> list[str]:
+def versions(packages: Iterable[str] = _PACKAGES) -> list[str]:
+    """Return which versions are installed."""
     found = []
-    for package in _PACKAGES:
+    for package in packages:
         try:
             found.append(f"{package} {version(package)}")
         except PackageNotFoundError:
@@ -277,7 +280,8 @@ def _driver(measured: Measured) -> str:
                  if result.info), "none")
 
 
-def _processor() -> str:
+def processor() -> str:
+    """Return what the processor is called."""
     try:
         lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
         return next(line.split(":", 1)[1].strip() for line in lines if line.startswith("model name"))
@@ -285,5 +289,6 @@ def _processor() -> str:
         return platform.processor() or platform.machine()
 
 
-def _cores() -> set[int]:
+def cores() -> set[int]:
+    """Return the cores that this process may use."""
     return os.sched_getaffinity(0) if hasattr(os, "sched_getaffinity") else set(range(os.cpu_count() or 1))

@@ -35,8 +35,9 @@ if TYPE_CHECKING:
     from facegen.geometry.mesh import Mesh
     from facegen.jobs.batch import run_batch
     from facegen.jobs.frames import save_clip, save_turn
+    from facegen.jobs.rigging import rig
     from facegen.render import Renderer, Wireframe, render, render_passes, save_passes
-    from facegen.transfer.rig import avatar_names, rig
+    from facegen.transfer.rig import avatar_names
 
 __version__ = "0.1.0"
 
@@ -109,11 +110,12 @@ _HOMES = {
     "facegen.geometry.mesh": ("Mesh",),
     "facegen.jobs.batch": ("run_batch",),
     "facegen.jobs.frames": ("save_clip", "save_turn"),
+    "facegen.jobs.rigging": ("rig",),
     "facegen.render.overlay": ("Wireframe",),
     "facegen.render.passes": ("render_passes",),
     "facegen.render.passfiles": ("save_passes",),
     "facegen.render.render": ("Renderer",),
-    "facegen.transfer.rig": ("avatar_names", "rig"),
+    "facegen.transfer.rig": ("avatar_names",),
     "facegen": ("render",),                 # the package itself: calling it draws
 }
 _HOME = {name: module for module, names in _HOMES.items() for name in names}

@@ -11,9 +11,18 @@ from facegen.blendshapes.recipes import shape_set
 from facegen.face.face import load_face
 from facegen.face.motion import shape_motion
 from facegen.fileio.avatar import AvatarFile, save_avatar
+from facegen.fileio.kept import VARIABLE
 
 RIG_DETAIL = 1
 NECK = [0.0, -70.0, -75.0]
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _own_cache(tmp_path_factory):
+    """Nothing is kept in the folder of whoever runs the tests, nor found there."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv(VARIABLE, str(tmp_path_factory.mktemp("cache")))
+        yield
 
 
 @pytest.fixture(scope="session")

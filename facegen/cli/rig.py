@@ -16,19 +16,35 @@ Out = Annotated[Path | None, typer.Option(
     "--output", "-o", metavar="OUT", help="Where it goes: .glb, .gltf, .vrm, .npz or an OBJ folder. [required]")]
 Marks = Annotated[Path | None, typer.Option(
     "--landmarks", "-l", metavar="FILE", help="The avatar's landmarks; a shipped avatar has its own.")]
-Sets = Annotated[str, typer.Option(
-    "--set", metavar="SETS", help="Which shapes, by commas: units, expressions, arkit, visemes, vrm or all.")]
+Sets = Annotated[str | None, typer.Option(
+    "--set", metavar="SETS",
+    help="Which shapes, by commas: units, expressions, arkit, visemes, vrm or all. [default: units,arkit,visemes]")]
+Shapes = Annotated[str | None, typer.Option("--shapes", metavar="NAMES", help="Only these of them, by commas.")]
+OtherTemplate = Annotated[Path | None, typer.Option(
+    "--template", metavar="FACE",
+    help="Another face with shapes instead of facegen's own: .glb, .gltf, .vrm or a folder with neutral.obj.")]
+OtherMarks = Annotated[Path | None, typer.Option(
+    "--template-landmarks", metavar="FILE", help="Its landmarks; what facegen rigged has them in the file.")]
 Method = Annotated[str, typer.Option("--method", metavar="NAME", help="landmarks, or to compare: sumner, cloning.")]
+EnergyWeights = Annotated[str | None, typer.Option(
+    "--weights", metavar="WEIGHTS",
+    help="Of the energies: ours, paper, a .yaml file, or by name, such as landmarks=20,anchor=0.03. [default: ours]")]
 Opening = Annotated[float, typer.Option("--opening", metavar="FACTOR", help="How far the jaw opens, of the estimate.")]
 Pieces = Annotated[list[str] | None, typer.Option(
     "--piece", metavar="PART=KIND", help="What a part is (skin, eye_L, teeth_upper, skull, carried ...); repeatable.")]
+Preview = Annotated[Path | None, typer.Option(
+    "--preview", metavar="PICTURE", help="Also draw a sheet of what the shapes do: .png, .webp or .jpg.")]
 NoNormals = Annotated[bool, typer.Option("--no-normals", help="Leave out how normals change: half the size.")]
 Quantise = Annotated[bool, typer.Option("--quantise", help="Two bytes a number instead of four.")]
+NoCache = Annotated[bool, typer.Option(
+    "--no-cache", help="Lay the skin on the template anew, and do not keep that for the next time.")]
 
 
-def rig(avatar: Avatar, output: Out = None, landmarks: Marks = None, sets: Sets = "units,arkit,visemes",
-        person: PersonName = None, method: Method = "landmarks", opening: Opening = 1.0, piece: Pieces = None,
-        no_normals: NoNormals = False, quantise: Quantise = False, json: Json = False, quiet: Quiet = False) -> None:
+def rig(avatar: Avatar, output: Out = None, landmarks: Marks = None, sets: Sets = None, shapes: Shapes = None,
+        person: PersonName = None, template: OtherTemplate = None, template_landmarks: OtherMarks = None,
+        method: Method = "landmarks", weights: EnergyWeights = None, opening: Opening = 1.0, piece: Pieces = None,
+        preview: Preview = None, no_normals: NoNormals = False, quantise: Quantise = False, no_cache: NoCache = False,
+        json: Json = False, quiet: Quiet = False) -> None:
     """Give an avatar the expressions as blendshapes.
 
     For example: facegen rig cat.obj --landmarks cat.yaml -o cat.glb
@@ -42,17 +58,23 @@ def rig(avatar: Avatar, output: Out = None, landmarks: Marks = None, sets: Sets 
         if not (part and equals and kind):
             raise InputError(f"--piece: expected PART=KIND such as hat=skull, got {entry!r}")
         given[part] = kind
-    from facegen.transfer.rig import rig as make
+    from facegen.jobs.rigging import rig as make
 
-    names = [name.strip() for name in sets.split(",") if name.strip()]
-    made = make(avatar, output, landmarks=landmarks, sets=names, person=person, method=method, opening=opening,
-                pieces=given, normals=not no_normals, quantise=quantise)
+    made = make(avatar, output, landmarks=landmarks, sets=_listed(sets), shapes=_listed(shapes), person=person,
+                template=template, template_landmarks=template_landmarks, method=method, weights=weights,
+                opening=opening, pieces=given, preview=preview, normals=not no_normals, quantise=quantise,
+                cache=not no_cache)
     if not quiet:
         warn(made.warnings)
     if json:
         print_json({"file": str(made.path), "shapes": list(made.names), "warnings": list(made.warnings),
-                    "pieces": made.pieces})
+                    "preview": None if preview is None else str(preview), "pieces": made.pieces})
     elif not quiet:
         for row in made.pieces:
             print(f"{row['name']}: {row['kind']}, {row['triangles']} triangles ({row['why']})")
         print(f"{made.path}: {len(made.names)} shapes")
+
+
+def _listed(text: str | None) -> list[str] | None:
+    """Return "a, b" as names."""
+    return None if text is None else [name.strip() for name in text.split(",") if name.strip()]

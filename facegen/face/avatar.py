@@ -1,7 +1,9 @@
 """An avatar with blendshapes is a face like any other: expressions, action units and raw data become its weights.
 
-    v = v0 + sum_i w_i s_i
+    v = v0 + sum_i w_i s_i + sum_i 4 w_i (1 - w_i) c_i
 
+The last, with weights between 0 and 1, keeps lids half way on large round eyes (`facegen.transfer.halfway`); few shapes
+have such a corrective c_i.
 A rig of facegen's own units is posed exactly by the coefficients that the unit table gives. Another rig - ARKit's
 shapes, expressions, VRM's presets, visemes - is posed by the weights that come nearest (`facegen.face.convert`).
 """
@@ -72,7 +74,7 @@ class AvatarFace:
         self.path = avatar.path
         self.digest = avatar.digest
         self.colours: Mapping[str, tuple[float, float, float]] = dict(avatar.colours)
-        self.notes: Notes = read_notes(avatar.notes, str(avatar.path), backward=_is_vrm0(avatar))
+        self.notes: Notes = read_notes(avatar.notes, str(avatar.path), backward=avatar.is_vrm0)
         self._file = avatar
         self._mesh = replace(avatar.mesh, vertices=self.notes.apply(avatar.mesh.vertices),
                              colours=avatar.vertex_colours)
@@ -144,19 +146,22 @@ class AvatarFace:
     def pose_shapes(self, weights: Mapping[str, float]) -> Array:
         """Return the vertices (n, 3), mm, for blendshape -> weight, by the file's own names. Weights may leave 0..1.
 
-        No weight moves nothing: the neutral comes back bit for bit. InputError for a name that the file has not.
+        Shapes that the file's notes correct half way are corrected. No weight moves nothing: the neutral comes back bit
+        for bit. InputError for a name that the file has not.
         """
-        vertices = self._mesh.vertices.copy()
-        for name in self.shapes:
-            weight = weights.get(name, 0.0)
-            if weight:
-                rows, moves = self._moved(name)
-                vertices[rows] += weight * moves
         for name, weight in weights.items():
             if name not in self._file.shapes:
                 raise InputError(f"weights: {self.path.name} has no shape '{name}'{nearest(name, self.shapes)}")
             if isinstance(weight, bool) or not isinstance(weight, numbers.Real) or not np.isfinite(weight):
                 raise InputError(f"weights: {name}: expected a finite number, got {weight!r}")
+        vertices = self._mesh.vertices.copy()
+        halves = {half: 4.0 * weights[name] * (1.0 - weights[name]) for name, half in self.notes.halves.items()
+                  if half in self._file.shapes and 0.0 < weights.get(name, 0.0) < 1.0}
+        for name in self.shapes:
+            weight = weights.get(name, 0.0) + halves.get(name, 0.0)
+            if weight:
+                rows, moves = self._moved(name)
+                vertices[rows] += weight * moves
         return vertices
 
     def resolve(self, what: Any, *, person: Any = None, intensity: float = 1.0) -> Resolution:
@@ -251,12 +256,6 @@ class AvatarFace:
         for part in set(self.notes.parts("body")) & set(self._mesh.parts):
             weight[self._mesh.part_vertices(part)] = 0.0
         return weight
-
-
-def _is_vrm0(avatar: AvatarFile) -> bool:
-    """Return whether a file is of VRM 0.x, whose avatars look to -z."""
-    found = getattr(getattr(avatar.source, "file", None), "json", {})
-    return isinstance(found.get("extensions"), Mapping) and "VRM" in found["extensions"]
 
 
 def _head_of(found: Resolution) -> Mapping[str, float]:

@@ -27,7 +27,7 @@ class Notes:
     ``scale``, ``rotation`` (3, 3), ``offset`` (3,): y = scale * rotation @ x + offset. ``framed``: whether the file
     says so, or that of glTF is assumed. ``landmarks``: name -> place (3,) in millimetres. ``neck``: where the head
     turns, millimetres, or None. ``sets``: shape -> the set it belongs to. ``pieces``: part -> what it is ("skin",
-    "eye_L", "body" ...), as far as noted.
+    "eye_L", "body" ...), as far as noted. ``halves``: shape -> the shape that corrects it half way.
     """
 
     scale: float = METRE
@@ -38,6 +38,7 @@ class Notes:
     neck: Array | None = None
     sets: Mapping[str, str] = field(default_factory=dict)
     pieces: Mapping[str, str] = field(default_factory=dict)
+    halves: Mapping[str, str] = field(default_factory=dict)
 
     def parts(self, *kinds: str) -> tuple[str, ...]:
         """Return the parts whose kind begins with one of these."""
@@ -77,10 +78,14 @@ def read_notes(notes: Mapping, source: str, *, backward: bool = False) -> Notes:
         known = dict(entry.items())
         if "set" in known and known["set"].value in SETS:
             sets[shape] = known["set"].value
-    pieces = {part: entry.value for part, entry in top["pieces"].items() if isinstance(entry.value, str)} \
-        if "pieces" in top else {}
+
+    def words(key: str) -> dict[str, str]:
+        return {name: entry.value for name, entry in top[key].items() if isinstance(entry.value, str)} \
+            if key in top else {}
+
     return Notes(scale, rotation, offset, framed, {name: landmarks[name] for name in NAMES if name in landmarks},
-                 place(top["neck"]) if "neck" in top and top["neck"].value is not None else None, sets, pieces)
+                 place(top["neck"]) if "neck" in top and top["neck"].value is not None else None, sets,
+                 words("pieces"), words("halves"))
 
 
 def _rotation(entry: Entry) -> Array:

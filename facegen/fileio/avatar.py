@@ -25,7 +25,7 @@ from facegen.fileio.obj import ObjFile, read_obj
 from facegen.fileio.obj_sequence import check_names, save_sequence
 from facegen.fileio.scans import read_scan
 from facegen.fileio.textfile import check_place, whole_file
-from facegen.fileio.vrm import check_expressions
+from facegen.fileio.vrm import check_expressions, is_vrm0
 from facegen.geometry.mesh import Mesh
 
 READABLE = (".obj", ".glb", ".gltf", ".vrm", ".ply", ".stl")
@@ -54,6 +54,11 @@ class AvatarFile:
     notes: Mapping[str, Any] = field(default_factory=dict)
     digest: str = ""
     source: GltfScene | ObjFile | None = field(default=None, repr=False)      # what is kept when it is written again
+
+    @property
+    def is_vrm0(self) -> bool:
+        """Whether it is a VRM 0.x avatar: those look to -z, and their expressions are none that facegen writes."""
+        return is_vrm0(getattr(getattr(self.source, "file", None), "json", {}))
 
 
 def load_avatar(path: str | os.PathLike[str]) -> AvatarFile:

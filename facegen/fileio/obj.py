@@ -28,10 +28,12 @@ _LARGEST_UNIT_COLOUR = 1.0
 class ObjFile:
     """What one OBJ file says. ``colours``: (n, 3) sRGB 0..255 of "v x y z r g b" lines, if all have them.
 
-    ``libraries``: what follows ``mtllib``, line by line. ``raw``: the file's bytes.
+    ``polygons``: the faces as they stand there, all their corners' vertices and how many each has; the mesh has them in
+    triangles. ``libraries``: what follows ``mtllib``, line by line. ``raw``: the file's bytes.
     """
 
     mesh: Mesh
+    polygons: tuple[NDArray[np.int64], NDArray[np.int64]]
     colours: NDArray[np.float64] | None
     libraries: tuple[str, ...]
     raw: bytes
@@ -83,7 +85,7 @@ class _Reader:
         triangles, owner = fans(vertices, corners, sizes)
         mesh = Mesh(vertices, triangles, tuple(self.materials), np.array(self.face_materials)[owner],
                     tuple(self.parts), np.array(self.face_parts)[owner])
-        return ObjFile(mesh, self._colours(), tuple(self.libraries), self.raw)
+        return ObjFile(mesh, (corners, sizes), self._colours(), tuple(self.libraries), self.raw)
 
     def _collect(self) -> None:
         part, material = "skin", "skin"

@@ -22,6 +22,12 @@ def is_vrm(found: Mapping[str, Any]) -> bool:
     return isinstance(extensions, dict) and isinstance(extensions.get("VRMC_vrm"), dict)
 
 
+def is_vrm0(found: Mapping[str, Any]) -> bool:
+    """Return whether a glTF file's JSON says that it is a VRM 0.x avatar. Such avatars look to -z."""
+    extensions = found.get("extensions")
+    return isinstance(extensions, Mapping) and "VRM" in extensions
+
+
 def check_expressions(expressions: Mapping[str, Mapping[str, float]], shapes: Sequence[str]) -> None:
     """Raise InputError for a weight that is none or a shape that is not there."""
     for name, weights in expressions.items():

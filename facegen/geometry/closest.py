@@ -19,6 +19,12 @@ _TRIED = 12
 _FIRST = 3
 # Because a triangle with a side of more than this many typical sides would be missed by its middle alone.
 _LARGE = 2.0
+# Labels of two places contradict each other where their product is below this. Because the edges of closed lips, a
+# tenth of a millimetre apart, have labels of a quarter with opposite signs, and a cheek beside them has less.
+_CONTRADICTION = -0.01
+# Because a foot on a side is as near on one triangle as on the other, and rounding is not to decide: squares of
+# distances count as one below this share, of the square or of a typical triangle's; cosines below that difference.
+_SAME, _ALIKE = 1e-9, 1e-6
 _TINY = 1e-300
 
 
@@ -51,7 +57,8 @@ class ClosestPoints:
         large = np.flatnonzero(reach > _LARGE * np.median(reach))
         more = (corners[large] + centroids[large, None]) / 2                    # towards each corner
         self._owner = np.concatenate([np.arange(len(corners)), np.repeat(large, 3)])
-        self._reach = reach
+        self._reach, self._typical = reach, np.median(reach) if len(reach) else 0.0
+        self._triangles = _planes(corners)
         self._tree = cKDTree(np.concatenate([centroids, more.reshape(-1, 3)]))
 
     def __call__(self, points: NDArray, normals: NDArray | None = None, *, least_cosine: float = 0.0,
@@ -60,57 +67,77 @@ class ClosestPoints:
 
         normals (p, 3): only triangles whose normal has more than ``least_cosine`` with it are allowed (Onizuka 2018,
         section 4.2: within 90 degrees, so that the two lips are not confused). labels: numbers of the points (p, k)
-        and of the triangles (m, k); a triangle is allowed where no product of two is below minus a quarter - the
+        and of the triangles (m, k); a triangle is allowed where no product of two is below `_CONTRADICTION`: the
         signs say on which side of a slit a place lies.
         """
         points = np.asarray(points, float)
         k, rows = min(_TRIED, len(self._owner)), np.arange(len(points))
         apart, near = self._tree.query(points, k=k, workers=-1)
         near, apart = self._owner[near.reshape(len(points), k)], apart.reshape(len(points), k)
-        allowed = np.ones(near.shape, bool)
-        if normals is not None:
-            allowed &= np.einsum("pi,pki->pk", normals, self.surface.normals[near]) > least_cosine
+        facing = np.ones(near.shape) if normals is None else \
+            np.einsum("pi,pki->pk", normals, self.surface.normals[near])
+        allowed = facing > least_cosine
         if labels is not None:
-            allowed &= (labels[0][:, None, :] * labels[1][near] > -0.25).all(axis=2)
-        weights, feet = np.zeros((len(points), k, 3)), np.zeros((len(points), k, 3))
-        distance = np.full((len(points), k), np.inf)
+            allowed &= (labels[0][:, None, :] * labels[1][near] > _CONTRADICTION).all(axis=2)
+        v, w = np.zeros((2, len(points), k))
+        square = np.full((len(points), k), np.inf)              # of the distance
+        columns = np.ascontiguousarray(points.T)
 
         def measure(p: NDArray, j: NDArray) -> None:
-            corners = self.surface.corners[near[p, j]]
-            weights[p, j] = _barycentric_of_foot(corners, points[p])
-            feet[p, j] = np.einsum("pc,pci->pi", weights[p, j], corners)
-            distance[p, j] = np.sqrt(((feet[p, j] - points[p]) ** 2).sum(axis=1))
+            v[p, j], w[p, j], square[p, j] = _feet(self._triangles.take(near[p, j], axis=1), columns.take(p, axis=1))
 
         measure(*np.nonzero(allowed & (np.arange(k) < _FIRST)))
-        hopeful = apart - self._reach[near] < distance[:, :_FIRST].min(axis=1)[:, None]
+        hopeful = apart < (1 + _SAME) * (self._reach[near] + np.sqrt(square[:, :_FIRST].min(axis=1))[:, None])
         measure(*np.nonzero(allowed & (np.arange(k) >= _FIRST) & hopeful))
-        best = distance.argmin(axis=1)
-        found = np.isfinite(distance[rows, best])
-        return Feet(np.where(found, near[rows, best], -1), weights[rows, best], feet[rows, best], distance[rows, best])
+        best = self._best(near, square, facing)
+        found = np.isfinite(square[rows, best])
+        v, w, faces = v[rows, best], w[rows, best], near[rows, best]
+        weights = np.where(found[:, None], np.stack([1 - v - w, v, w], axis=1), 0.0)
+        feet = np.einsum("pc,pci->pi", weights, self.surface.corners[faces])
+        distances = np.where(found, np.sqrt(((feet - points) ** 2).sum(axis=1)), np.inf)
+        return Feet(np.where(found, faces, -1), weights, feet, distances)
+
+    def _best(self, near: NDArray, square: NDArray, facing: NDArray) -> NDArray[np.int64]:
+        """Return which column (p,) of the triangles (p, k) is the nearest; of those as near, the one that faces the
+        point's way most; of those that do alike, the first in the surface's list."""
+        least = square.min(axis=1)
+        as_near = square <= (least + _SAME * (least + self._typical**2))[:, None]
+        facing = np.where(as_near, facing, -np.inf)
+        alike = facing >= facing.max(axis=1)[:, None] - _ALIKE
+        return np.where(alike, near, len(self._reach)).argmin(axis=1)
 
 
-def _barycentric_of_foot(corners: NDArray, points: NDArray) -> NDArray[np.float64]:
-    """Return the weights (..., 3) of the corners (..., 3, 3) of the nearest place of each triangle."""
-    a, b, c = np.moveaxis(corners, -2, 0)
-    ab, ac, ap = b - a, c - a, points - a
+def _planes(corners: NDArray) -> NDArray[np.float64]:
+    """Return what `_feet` asks of triangles (m, 3, 3), as rows (12, m): a corner a and the sides b and c from it, then
+    b.b, c.c, b.c."""
+    a, b, c = corners[:, 0], corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    dots = [np.einsum("mi,mi->m", p, q) for p, q in ((b, b), (c, c), (b, c))]
+    return np.concatenate([a.T, b.T, c.T, dots])
 
-    def dot(p: NDArray, q: NDArray) -> NDArray:
-        return np.einsum("...i,...i->...", p, q)
 
-    d1, d2 = dot(ab, ap), dot(ac, ap)
-    ab2, ac2, abac = dot(ab, ab), dot(ac, ac), dot(ab, ac)
-    det = np.maximum(ab2 * ac2 - abac**2, _TINY)
-    v, w = (ac2 * d1 - abac * d2) / det, (ab2 * d2 - abac * d1) / det
-    inside = (v >= 0) & (w >= 0) & (v + w <= 1)
-    # outside: the nearest place of the three sides
-    bc2 = ab2 + ac2 - 2 * abac
-    t_ab = np.clip(d1 / np.maximum(ab2, _TINY), 0, 1)
-    t_ac = np.clip(d2 / np.maximum(ac2, _TINY), 0, 1)
-    t_bc = np.clip((d2 - d1 + ab2 - abac) / np.maximum(bc2, _TINY), 0, 1)
-    zero = np.zeros_like(t_ab)
-    sides = np.stack([np.stack([1 - t_ab, t_ab, zero], -1), np.stack([1 - t_ac, zero, t_ac], -1),
-                      np.stack([zero, 1 - t_bc, t_bc], -1)], axis=-2)
-    off = np.einsum("...sc,...ci->...si", sides, corners) - points[..., None, :]
-    nearest = dot(off, off).argmin(axis=-1)
-    side = np.take_along_axis(sides, nearest[..., None, None], axis=-2)[..., 0, :]
-    return np.where(inside[..., None], np.stack([1 - v - w, v, w], -1), side)
+def _feet(triangles: NDArray, points: NDArray) -> tuple[NDArray, NDArray, NDArray]:
+    """Return the weights (q,) of the second and the third corner at the nearest place of each triangle, and the square
+    of the distance. triangles (12, q): `_planes`; points (3, q): one for each."""
+    b, c = triangles[3:6], triangles[6:9]
+    bb, cc, bc = triangles[9:]
+    x, y, z = points - triangles[:3]
+    d, e = b[0] * x + b[1] * y + b[2] * z, c[0] * x + c[1] * y + c[2] * z
+    det = np.maximum(bb * cc - bc**2, _TINY)
+    v, w = (cc * d - bc * e) / det, (bb * e - bc * d) / det
+    out = np.flatnonzero((v < 0) | (w < 0) | (v + w > 1))
+    v[out], w[out] = _on_sides(*(one[out] for one in (bb, cc, bc, d, e)))
+    return v, w, (x - v * b[0] - w * c[0])**2 + (y - v * b[1] - w * c[1])**2 + (z - v * b[2] - w * c[2])**2
+
+
+def _on_sides(bb: NDArray, cc: NDArray, bc: NDArray, d: NDArray, e: NDArray) -> tuple[NDArray, NDArray]:
+    """Return the weights (q,) of the second and the third corner at the nearest place of the three sides; d, e: the
+    way from the first corner, times the sides b and c."""
+    first, second = (np.clip(along / np.maximum(length, _TINY), 0, 1) for along, length in ((d, bb), (e, cc)))
+    third = np.clip((e - d + bb - bc) / np.maximum(bb + cc - 2 * bc, _TINY), 0, 1)      # from the second to the third
+    # Squares of distances less that of the first corner: enough to compare.
+    on_first, on_second = first * (first * bb - 2 * d), second * (second * cc - 2 * e)
+    rest = 1 - third
+    on_third = rest * (rest * bb + 2 * third * bc - 2 * d) + third * (third * cc - 2 * e)
+    v, w = np.where(on_first <= on_second, first, 0.0), np.where(on_first <= on_second, 0.0, second)
+    across = on_third < np.minimum(on_first, on_second)
+    return np.where(across, rest, v), np.where(across, third, w)

@@ -148,7 +148,7 @@ def hinge_energy(surface: Surface) -> sparse.csc_array:
     columns = np.concatenate([surface.faces[pairs[:, 0]], surface.faces[pairs[:, 1]]], axis=1)
     area = surface.areas[pairs[:, 0]] + surface.areas[pairs[:, 1]]
     squared = np.einsum("hi,hi->h", edge, edge)
-    weight = squared / np.maximum(area, LOWEST_ALTITUDE * squared)
+    weight = squared / np.maximum(np.maximum(area, LOWEST_ALTITUDE * squared), _TINY)
     rows = np.repeat(np.arange(h), 6)
     difference = sparse.csr_array((values.ravel(), (rows, columns.ravel())), shape=(h, n))
     return sparse.csc_array(difference.T @ difference.multiply(weight[:, None]).tocsr())

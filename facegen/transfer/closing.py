@@ -26,8 +26,8 @@ Array = NDArray[np.float64]
 
 # Places whose gap on the template is below this, mm, are corners: they close as their neighbours do.
 _CORNER = 0.15
-# What the template closes counts in full from this share of the gap on.
-_LEAST_CLOSING = 0.1
+# What the template closes, or opens wider, counts in full from this share of the gap on.
+_LEAST_CHANGE = 0.1
 # Millimetres: lips farther apart than this at some place have parted there.
 _PARTED = 1.0
 # Millimetres: a miss of this size counts half; on a faithful copy there is none to mend.
@@ -42,6 +42,8 @@ _ON_THE_BALL = 1.25
 _LIFTED, _OUT = 0.15, 0.02
 # The middle of a triangle with sides s lies nearer to the eye than its corners: sqrt(1 - s^2 / 3), at most so much.
 _MOST_SAG = 0.3
+# What counts less than this is rounding: most shapes leave a slit as it is.
+_NOTHING = 1e-9
 _TINY = 1e-300
 
 
@@ -67,12 +69,18 @@ class Closing:
     eye: EyeFront | None
     wanted: _Wanted
 
+    def closes(self) -> NDArray[np.bool_]:
+        """Return which shapes (k,) shut the slit."""
+        return self.wanted.shut.any(axis=1)
+
     def close(self, motion: Array) -> None:
         """Add to the displacements (k, n, 3) of the skin what they miss, in place."""
-        wanted = self.wanted
+        wanted, gap = self.wanted, self.margins.gap(self.rest)
         for k in np.flatnonzero(wanted.active.max(axis=1) > 0):
-            missing = wanted.active[k, :, None] * (wanted.gap[k] - self.margins.gap(self.rest + motion[k]))
+            missing = wanted.active[k, :, None] * (wanted.gap[k] - gap - self.margins.gap(motion[k]))
             counts = _beyond(missing)
+            if counts.max() < _NOTHING:
+                continue
             missing = missing * counts[:, None]
             share = wanted.upper_share[k]
             self._move(motion[k], self.field.steps(share * missing, (share - 1.0) * missing))
@@ -89,18 +97,19 @@ class Closing:
             step += (share * _beyond(away, _ROLLS))[:, None] * away
         return step
 
-    def seal(self, motion: Array) -> None:
-        """Bring edges that are shut onto one line, no nearer to the eye than either, in place."""
+    def seal(self, motion: Array, rows: NDArray[np.int64]) -> None:
+        """Bring edges that are shut onto one line, no nearer to the eye than either, in displacements (k, all, 3) of
+        vertices of which ``rows`` (n,) are the skin's, in place."""
         shut = self.wanted.shut
         for k in np.flatnonzero(shut.any(axis=1)):
-            upper, lower = self.margins.ends(self.rest + motion[k])
+            upper, lower = self.margins.ends(self.rest + motion[k, rows])
             line = (upper + lower) / 2
             if self.eye is not None:
                 centre = self.eye.ball.centre
                 farther = np.maximum(*(np.linalg.norm(edge - centre, axis=1) for edge in (upper, lower)))
                 line = centre + farther[:, None] * _unit(line - centre)
             on = (shut[k] * _beyond(upper - lower - self.wanted.gap[k]))[:, None]
-            motion[k, self.field.rows] += self.field.steps(on * (line - upper), on * (line - lower))
+            motion[k, rows[self.field.rows]] += self.field.steps(on * (line - upper), on * (line - lower))
 
     @cached_property
     def _at_rest(self) -> Array:
@@ -172,11 +181,10 @@ def _told_lids(gap: Array, upper: Array, lower: Array, own_gap: Array, part: Arr
     ratio = ratio[:, open_at[np.abs(np.arange(SAMPLES)[:, None] - open_at).argmin(axis=1)]]
     across = moved - ratio[:, :, None] * gap
     target = ratio[:, :, None] * own_gap + across @ part.T
-    active = smooth_step((1.0 - ratio) / _LEAST_CLOSING)
+    active = smooth_step(np.abs(1.0 - ratio) / _LEAST_CHANGE)
     shut = (ratio <= _SHUT) & (np.linalg.norm(target, axis=2) <= _SHUT_MM) & (active > 0)
-    down = np.maximum(-(upper * toward).sum(axis=2), 0.0).sum(axis=1)
-    up = np.maximum((lower * toward).sum(axis=2), 0.0).sum(axis=1)
-    share = np.where(down + up > _TINY, down / np.maximum(down + up, _TINY), 0.5)
+    ways = [np.abs((edge * toward).sum(axis=2)).sum(axis=1) for edge in (upper, lower)]
+    share = np.where(sum(ways) > _TINY, ways[0] / np.maximum(sum(ways), _TINY), 0.5)
     return _Wanted(target, active, share, shut)
 
 

@@ -18,7 +18,7 @@ _TRIED = 16
 
 
 def edge_frames(vertices: NDArray, faces: NDArray, *, root: bool = False) -> NDArray[np.float64]:
-    """Return V = [v2 - v1, v3 - v1, v4 - v1] as columns, (..., m, 3, 3), of triangles (eq. 2-3).
+    """Return V = [v2 - v1, v3 - v1, v4 - v1] as columns, (..., m, 3, 3), of triangles (eq. 2, 5).
 
     v4 - v1 is the unit normal (Onizuka, eq. 2); with ``root`` the cross product divided by the square root of its
     length (Sumner & Popovic): then a uniform scale of the mesh scales all three columns alike.
@@ -32,7 +32,7 @@ def edge_frames(vertices: NDArray, faces: NDArray, *, root: bool = False) -> NDA
 
 def deformation_gradients(neutral: NDArray, deformed: NDArray, faces: NDArray, *,
                           root: bool = False) -> NDArray[np.float64]:
-    """Return T = V~ V^-1 (..., m, 3, 3): how each triangle's neighbourhood is mapped (eq. 4-7).
+    """Return T = V~ V^-1 (..., m, 3, 3): how each triangle's neighbourhood is mapped (eq. 4, 7).
 
     neutral (n, 3), deformed (..., n, 3). The identity where nothing moves.
     """

@@ -18,6 +18,7 @@ from facegen.face.deformer import Jaw
 from facegen.geometry.closest import Feet
 from facegen.geometry.factor import Factor
 from facegen.geometry.operators import Surface, dirichlet, hinge_energy
+from facegen.transfer.solve import rotation_between
 from facegen.transfer.template import placing
 
 # Because a jaw that turns less than this share of the template's hardly opens, and one that turns more dislocates.
@@ -66,9 +67,11 @@ def avatar_jaw(template_hinge: Jaw, template: Mapping[str, NDArray], avatar: Map
     given = all(f"jaw_{side}" in points for side in "LR" for points in (template, avatar))
     if given:
         middle = (template["jaw_L"] + template["jaw_R"]) / 2
-        axis = avatar["jaw_L"] - avatar["jaw_R"]
-        width = np.linalg.norm(axis) / max(np.linalg.norm(template["jaw_L"] - template["jaw_R"]), 1e-9)
+        axis, across = (points["jaw_L"] - points["jaw_R"] for points in (avatar, template))
+        width = np.linalg.norm(axis) / max(np.linalg.norm(across), 1e-9)
         hinge = (avatar["jaw_L"] + avatar["jaw_R"]) / 2 + (template_hinge.hinge - middle) * [0.0, width, width]
+        # The template's axis is lateral, whatever its joints' landmarks say: it turns as the line through them does.
+        axis = rotation_between(*(way[None] / max(np.linalg.norm(way), 1e-9) for way in (across, axis)))[0, :, 0]
     else:
         weight = share + 1e-3 * share.mean()
         centre_r, centre_o = (np.average(p, axis=0, weights=weight) for p in (registered, original))

@@ -3,7 +3,8 @@
 Measured, then pushed apart as far as needed and no farther. Lids: how far a place of the skin lies outside the eye,
 along the ray from the eye's centre; the skin is pushed out. Lips: how far a tooth lies behind the outermost skin, along
 the way out of the mouth; the row of teeth gives way by a little, the skin by the rest. What stood out at rest, as buck
-teeth do, may stand out as far. A push spreads over the neighbours, so that it leaves no dent.
+teeth do, may stand out as far. A mouth's lining is thin and lies close behind the skin: it gives way by itself. A push
+spreads over the neighbours, so that it leaves no dent.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ from scipy import sparse
 from scipy.spatial import cKDTree
 
 from facegen.errors import InputError
+from facegen.geometry.ahead import ahead
 from facegen.geometry.normals import vertex_normals
 from facegen.geometry.operators import Surface
 from facegen.transfer.eyeball import Eyeball, gaze_rotation
@@ -48,6 +50,8 @@ _LIP_TRAVEL = 0.15
 # Lips: skin within this share of the height from the lip line that looks forward and was to be seen at rest.
 _LIP_REACH, _FORWARD = 0.6, 0.1
 _SEEN = 0.03
+# Skin of which the half, or this share of the height, is left before a lining is thick enough.
+_LEFT = 0.01
 # So many rings of neighbours share a push, and so many rounds make sure of it.
 _RINGS, _ROUNDS = 3, 4
 # Because a hundred-thousandth of an eye or a face is nothing.
@@ -87,13 +91,17 @@ def keep_apart(pieces: PieceMotion, motion: ArrayLike,
             own = angles[:, :2] if s == "L" else angles[:, 2:]
             turn = gaze_rotation(own[:, 0], own[:, 1], ball.azimuth)
             found[f"eye_{s}"] = _Lids(pieces, s, ball).part(motion, turn, deep.get(f"eye_{s}", none), spread)
-    rows = {kind: pieces.rows(kind) for kind in ("teeth_upper", "teeth_lower", "tongue")}
-    if any(len(one) for one in rows.values()):
-        lips = _Lips(pieces)
-        for kind, own in rows.items():
-            if len(own):
-                found[kind] = lips.part(motion, own, deep.get(kind, none), spread)
+    lips = _Lips(pieces)
+    for kind in ("teeth_upper", "teeth_lower", "tongue"):
+        if len(own := pieces.rows(kind)):
+            found[kind] = lips.part(motion, own, deep.get(kind, none), spread)
+    found["mouth"] = lips.lining(motion, pieces)
     return motion, found
+
+
+def _move(motion: Array, rows: NDArray, size: float) -> NDArray[np.bool_]:
+    """Return in which shapes (k,) any of the vertices moves by more than nothing of something of a size, mm."""
+    return np.abs(motion[:, rows]).max(axis=(1, 2), initial=0.0) > _DONE * size
 
 
 class _Spread:
@@ -172,7 +180,7 @@ class _Lids:
         if not len(self._corners):
             return Contact(before, after)
         turns = np.any(turn != np.eye(3), axis=(1, 2))
-        moves = np.any(motion[:, np.unique(self._corners)] != 0, axis=(1, 2))
+        moves = _move(motion, np.unique(self._corners), self._ball.radius)
         for k in np.flatnonzero(moves | turns):
             for step in range(_ROUNDS + 1):
                 missing = self._missing(motion[k], turn[k] if turns[k] else None, allowed[k])
@@ -216,11 +224,12 @@ class _Lips:
         corners = pieces.skin.corners @ self._axes.T
         middles = corners.mean(axis=1)
         near = np.linalg.norm(middles - self._axes @ face.lips, axis=1) < _LIP_REACH * face.height
+        self._near = np.unique(pieces.skin.faces[near])
         forward = pieces.skin.normals @ self._axes[2]
         near &= forward * (np.sign(forward[near].sum()) or 1.0) > _FORWARD      # triangles may be wound inward
         rows = np.flatnonzero(near)
         # What was hidden at rest, such as the back of the mouth, is no barrier.
-        seen = _ahead(middles[rows], corners[rows])[0] < _SEEN * face.height
+        seen = ahead(middles[rows], corners[rows])[0] < _SEEN * face.height
         self._faces = pieces.skin.faces[rows[seen]]
         self._facing = vertex_normals(pieces.vertices, pieces.faces) @ self._axes[2] > 0
 
@@ -228,7 +237,7 @@ class _Lips:
         """Bring a row of teeth behind the lips in all shapes, in place."""
         before, after = np.zeros(len(motion)), np.zeros(len(motion))
         corners = self._rest[self._faces] @ self._axes.T
-        gap, _ = _ahead(self._rest[rows] @ self._axes.T, corners)
+        gap, _ = ahead(self._rest[rows] @ self._axes.T, corners)
         near = (gap < _NEAR_LIPS * self._height) & (gap > -_THROUGH * self._height) & self._facing[rows]
         if not near.any():
             return Contact(before, after)
@@ -238,13 +247,13 @@ class _Lips:
         margin = _LIP_TRAVEL * self._height
         close = ((corners.max(axis=1) > at.min(axis=0) - margin) & (corners.min(axis=1) < at.max(axis=0) + margin))
         faces = self._faces[close[:, :2].all(axis=1)]
-        skin = np.unique(faces)
-        moves = np.any(motion[:, skin] != 0, axis=(1, 2)) | np.any(motion[:, own] != 0, axis=(1, 2))
-        for k in np.flatnonzero(moves):
+        skin, local = np.unique(faces, return_inverse=True)
+        local = local.reshape(-1, 3)
+        for k in np.flatnonzero(_move(motion, np.concatenate([skin, own]), self._height)):
             given = 0.0
             for step in range(_ROUNDS + 1):
                 places = (self._rest[own] + motion[k, own]) @ self._axes.T
-                now, which = _ahead(places, (self._rest + motion[k])[faces] @ self._axes.T)
+                now, which = ahead(places, ((self._rest[skin] + motion[k, skin]) @ self._axes.T)[local])
                 through = (which >= 0) & (now > -_THROUGH * self._height)
                 missing = np.where(through, np.maximum(least - now - allowed[k], 0.0), 0.0)
                 after[k] = missing.max()
@@ -260,35 +269,30 @@ class _Lips:
                 motion[k] += spread(push)[:, None] * self._axes[2]
         return Contact(before, after)
 
-
-def _ahead(places: Array, corners: Array) -> tuple[Array, NDArray[np.int64]]:
-    """Return how far (p,) the farthest triangle over each place is ahead of it along z, infinite without one, and
-    which (p,) it is, -1 without one. places (p, 3); corners (t, 3, 3)."""
-    ahead, which = np.full(len(places), np.inf), np.full(len(places), -1)
-    if not len(corners) or not len(places):
-        return ahead, which
-    a, ab, ac = corners[:, 0], corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
-    det = ab[:, 0] * ac[:, 1] - ab[:, 1] * ac[:, 0]
-    upright = np.abs(det) > _TINY
-    det = np.where(upright, det, np.inf)
-    b, c = corners[:, 1], corners[:, 2]
-    low, high = np.minimum(np.minimum(a, b), c), np.maximum(np.maximum(a, b), c)    # quicker than min(axis=1)
-    # Triangles in the order of their left ends: those over a place begin at most the widest one's width before it.
-    order = np.argsort(low[:, 0], kind="stable")
-    starts = low[order, 0]
-    first = np.searchsorted(starts, places[:, 0] - (high - low)[:, 0].max())
-    count = np.searchsorted(starts, places[:, 0], side="right") - first
-    p = np.repeat(np.arange(len(places)), count)
-    t = order[np.arange(len(p)) - np.repeat(np.cumsum(count) - count, count) + np.repeat(first, count)]
-    x, y = places[p, 0], places[p, 1]
-    near = (x <= high[t, 0]) & (y >= low[t, 1]) & (y <= high[t, 1]) & upright[t]
-    p, t = p[near], t[near]
-    d = places[p, :2] - a[t, :2]
-    v = (d[:, 0] * ac[t, 1] - d[:, 1] * ac[t, 0]) / det[t]
-    w = (ab[t, 0] * d[:, 1] - ab[t, 1] * d[:, 0]) / det[t]
-    over = (v >= 0) & (w >= 0) & (v + w <= 1)
-    p, t, v, w = p[over], t[over], v[over], w[over]
-    depth = a[t, 2] + v * ab[t, 2] + w * ac[t, 2] - places[p, 2]
-    rising = np.argsort(depth, kind="stable")       # the farthest is written last
-    ahead[p[rising]], which[p[rising]] = depth[rising], t[rising]
-    return ahead, which
+    def lining(self, motion: Array, pieces: PieceMotion) -> Contact:
+        """Bring the lining that lay behind the lips at rest behind them in all shapes, in place."""
+        before, after = np.zeros(len(motion)), np.zeros(len(motion))
+        corners = self._rest[self._faces] @ self._axes.T
+        own = np.setdiff1d(np.unique(np.concatenate([self._near, pieces.rows("mouth")])), self._faces)
+        gap, _ = ahead(self._rest[own] @ self._axes.T, corners)
+        behind = (gap > _ALLOWED * self._height) & (gap < _NEAR_LIPS * self._height)
+        own, least = own[behind], np.minimum(gap[behind] / 2, _LEFT * self._height)
+        if not len(own):
+            return Contact(before, after)
+        inner = [pieces.faces[piece.faces] for piece in pieces.pieces if piece.kind in ("skin", "mouth")]
+        spread = _Spread(Surface(self._rest, np.concatenate(inner)))
+        front, local = np.unique(self._faces, return_inverse=True)
+        local = local.reshape(-1, 3)
+        for k in np.flatnonzero(_move(motion, np.concatenate([front, own]), self._height)):
+            for step in range(_ROUNDS + 1):
+                places = (self._rest[own] + motion[k, own]) @ self._axes.T
+                now, which = ahead(places, ((self._rest[front] + motion[k, front]) @ self._axes.T)[local])
+                missing = np.where((which >= 0) & (now > -_THROUGH * self._height), np.maximum(least - now, 0.0), 0.0)
+                after[k] = missing.max()
+                before[k] = after[k] if step == 0 else before[k]
+                if after[k] <= _DONE * self._height or step == _ROUNDS:
+                    break
+                push = np.zeros(len(self._rest))
+                push[own] = missing
+                motion[k, own] -= spread(push)[own, None] * self._axes[2]
+        return Contact(before, after)

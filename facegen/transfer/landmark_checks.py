@@ -56,7 +56,8 @@ def place_faults(names: Sequence[str], corners: NDArray, weights: Array, mesh: M
         warnings += more_warnings
         if more_errors:
             return more_errors, warnings
-    return _positions(p)[0], warnings + _positions(p)[1]
+    errors, more_warnings = _positions(p)
+    return errors, warnings + more_warnings
 
 
 # -- the whole set -------------------------------------------------------------------------------------------------

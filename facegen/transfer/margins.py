@@ -12,11 +12,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
-from scipy.interpolate import CubicSpline
 from scipy.sparse.csgraph import dijkstra
 from scipy.spatial import cKDTree
 
 from facegen.geometry.operators import Surface
+from facegen.geometry.spline import smooth_curve
 from facegen.transfer.sides import SLITS
 from facegen.transfer.skin import Skin
 
@@ -30,6 +30,8 @@ SAMPLES = 33
 _NARROW = 0.7
 # A way on the wrong side of the slit is so many times as long.
 _WRONG_SIDE = 20.0
+# Millimetres on the template: no way leads farther round the guide than this.
+_BESIDE = 20.0
 # A guide is sampled at so many places.
 _GUIDE = 200
 
@@ -131,13 +133,15 @@ def _stops(slit: Slit, names: tuple[str, ...], places: Places) -> NDArray | None
 def _curve(stops: Array) -> Array:
     """Return a smooth curve (g, 3) through some places (s, 3)."""
     t = _lengths(stops, 1e-9)               # a spline's knots must differ
-    return CubicSpline(t, stops)(np.linspace(0, t[-1], _GUIDE))
+    return smooth_curve(t, stops, np.linspace(0, t[-1], _GUIDE))
 
 
 def _way(surface: Surface, at: Array, stops: NDArray, line: Array, side: Array) -> NDArray | None:
     """Return the vertices of the cheapest way along edges from stop to stop, or None where there is none."""
     edges, _ = surface.edges
-    middle = at[edges].mean(axis=1)
+    middle = (at[edges[:, 0]] + at[edges[:, 1]]) / 2
+    near = ((middle > line.min(axis=0) - _BESIDE) & (middle < line.max(axis=0) + _BESIDE)).all(axis=1)
+    edges, middle = edges[near], middle[near]
     off, _ = cKDTree(line).query(middle)
     length = np.linalg.norm(at[edges[:, 0]] - at[edges[:, 1]], axis=1) + 1e-6
     length = length * (1 + (off / _NARROW) ** 2) * np.where(side[edges].min(axis=1) < 0, _WRONG_SIDE, 1.0)

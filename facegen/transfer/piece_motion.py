@@ -25,8 +25,9 @@ Array = NDArray[np.float64]
 
 # A lining's jaw share goes from none to all over this share of its height, from the lip line both ways.
 _BLEND = 0.35
-# Its rim follows the lips within this share of the face's height: three millimetres on a person.
-_RIM = 0.03
+# It follows the skin over it, so that cheeks and lips that draw in do not bare it: wholly up to the first of these
+# shares of the face's height, four millimetres on a person, and not at all from the second on.
+_FOLLOWS, _LEFT = 0.04, 0.12
 
 
 @dataclass(frozen=True, eq=False)
@@ -131,16 +132,20 @@ class _Lining:
         height = (self._at - face.lips) @ face.lip_normal
         reach = _BLEND * max(float(np.abs(height).max()), 1e-300)
         self._jaw = smooth_step(0.5 - 0.5 * height / reach)
-        self._frames = None
+        self._over = []
         if kind_of_name(piece.name) != "teeth":         # teeth do not bend with the lips
-            self._frames = SkinFrames(skin, self._at)
-            self._rim = np.exp(-(self._frames.distances / (_RIM * face.height)) ** 2)
+            above = (skin.corners.mean(axis=1) - face.lips) @ face.lip_normal > 0
+            for half, faces in ((height > 0, skin.faces[above]), (height <= 0, skin.faces[~above])):
+                if half.any() and len(faces):           # closed lips touch: a lining's nearest lip may be the other one
+                    frames = SkinFrames(Surface(skin.vertices, faces), self._at[half])
+                    share = smooth_step((_LEFT - frames.distances / face.height) / (_LEFT - _FOLLOWS))
+                    self._over.append((half, frames, share[:, None]))
 
     def move(self, motion: Array, jaw: RigidMotions | None) -> Array:
         """Return the displacements (k, p, 3)."""
-        inner = np.zeros((len(motion), *self._at.shape)) if jaw is None else \
+        moved = np.zeros((len(motion), *self._at.shape)) if jaw is None else \
             self._jaw[:, None] * jaw.displacements(self._at)
-        if self._frames is None:
-            return inner
-        lips = np.einsum("pc,kpci->kpi", self._frames.weights, motion[:, self._frames.corners])
-        return inner + self._rim[:, None] * (lips - inner)
+        for half, frames, share in self._over:
+            skin = np.einsum("pc,kpci->kpi", frames.weights, motion[:, frames.corners])
+            moved[:, half] += share * (skin - moved[:, half])
+        return moved

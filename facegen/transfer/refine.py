@@ -27,19 +27,21 @@ def refine(surface: Surface, registered: NDArray, bend: Callable[[NDArray, NDArr
            ) -> tuple[Surface, NDArray, sparse.csr_array]:
     """Return the finer surface, its registered vertices, and the matrix that makes its vertices of the coarse ones.
 
-    registered (n, 3): the surface in the template's shape. bend(ends_a, ends_b): for sides given by places (e, 3) on
-    the template, how far (e,) in mm the motion of their middles is from the mean of their ends', at most.
+    registered (n, 3): the surface in the template's shape. bend(places, sides): for sides (e, 2) between places (n, 3)
+    on the template, how far (e,) in mm the motion of their middles is from the mean of their ends', at most.
     """
     vertices, faces = surface.vertices, surface.faces
     matrix = sparse.csr_array(sparse.identity(len(vertices), format="csr"))
+    asked = 0                                       # sides between the first so many vertices were looked at before
     for _ in range(_ROUNDS):
         fine = Surface(vertices, faces)
         edges, of_side = fine.edges
         a, b = registered[edges[:, 0]], registered[edges[:, 1]]
-        split = np.flatnonzero(((a - b) ** 2).sum(axis=1) > _SHORT**2)
-        split = split[bend(a[split], b[split]) > BEND] if len(split) else split
+        split = np.flatnonzero((((a - b) ** 2).sum(axis=1) > _SHORT**2) & (edges[:, 1] >= asked))
+        split = split[bend(registered, edges[split]) > BEND] if len(split) else split
         if not len(split):
             break
+        asked = len(vertices)
         middle = np.full(len(edges), -1)
         middle[split] = len(vertices) + np.arange(len(split))
         rows = np.repeat(np.arange(len(split)), 2)

@@ -5,8 +5,8 @@ template's. ES is smoothness, EI keeps the shape, EC draws every vertex to the n
 of the displacement u = x - x0 and its gradient in the triangles' planes, T - I = grad u:
 
     ES = integral |second derivative of u|^2     (eq. 10, as the jumps of grad u across edges)
-    EI = integral |grad u|^2                     (eq. 12)
-    EC = integral |x - c(x)|^2                   (eq. 13)
+    EI = integral |grad u|^2                     (eq. 11)
+    EC = integral |x - c(x)|^2                   (eq. 12)
 
 Integrals over the surface, not sums over its triangles: a finer mesh of the same face is registered alike. Where we
 differ from the paper: c(x) lies on the surface, not at a vertex; more and gentler steps; no partner across a slit or
@@ -20,6 +20,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
+from scipy.spatial import cKDTree
 
 from facegen.geometry.closest import ClosestPoints, Feet
 from facegen.geometry.factor import Factor
@@ -49,6 +50,10 @@ _HOLD = 1e2
 _LEAST_COSINE = 0.1
 # Because a place beyond the template's border has its nearest place on the border: this far in mm, it has no partner.
 _PAST = 1.0
+# Millimetres: a vertex this near to one of the template's is that one, if they look the same way: a copy's own.
+_COPY, _ALIKE = 1e-3, 0.5
+# So many of the template's vertices may share a place: two lips that touch, twice where lids meet them.
+_LIPS = 4
 
 
 class Correspondence:
@@ -59,9 +64,14 @@ class Correspondence:
         self._search = ClosestPoints(template)
         self.sides = sides
         self._face_sides = sides[template.faces].mean(axis=1)
-        _edges, of_side = template.edges
+        edges, of_side = template.edges
         border = template.border_edges
         self._border_side = border[of_side].reshape(-1, 3)
+        self._vertices = cKDTree(template.vertices)
+        self._normals = vertex_normals(template.vertices, template.faces)
+        self._face_of = np.zeros(len(template.vertices), np.int64)
+        self._face_of[template.faces.ravel()] = np.repeat(np.arange(len(template.faces)), 3)
+        self._border_corner = np.isin(template.faces, edges[border])
 
     def nearest(self, points: NDArray) -> Feet:
         """Return the nearest places of all, whatever their normals."""
@@ -70,11 +80,36 @@ class Correspondence:
     def __call__(self, points: NDArray, normals: NDArray, sides: NDArray, *, reach: float,
                  least_cosine: float = _LEAST_COSINE) -> Feet:
         """Return the feet; those beyond reach (mm) or on the template's border count as none."""
-        feet = self._search(points, normals, least_cosine=least_cosine, labels=(sides, self._face_sides))
+        feet = self._itself(points, normals, sides, self._search(
+            points, normals, least_cosine=least_cosine, labels=(sides, self._face_sides)))
         beyond = ~(feet.distances <= reach)
         on_side = feet.weights[:, [2, 0, 1]] < 1e-9         # no weight of the corner opposite side k
-        beyond |= feet.found & (on_side & self._border_side[feet.faces]).any(axis=1) & (feet.distances > _PAST)
+        on_border = (on_side & self._border_side[feet.faces]) | \
+            ((feet.weights > 1 - 1e-9) & self._border_corner[feet.faces])
+        beyond |= feet.found & on_border.any(axis=1) & (feet.distances > _PAST)
         return Feet(np.where(beyond, -1, feet.faces), feet.weights, feet.points, feet.distances)
+
+    def _itself(self, points: NDArray, normals: NDArray, sides: NDArray, feet: Feet) -> Feet:
+        """Return the feet with those of points that coincide with a vertex at that vertex: where the surface folds, a
+        vertex' normal may be far from those of all its triangles."""
+        apart, near = self._vertices.query(points, k=_LIPS, distance_upper_bound=_COPY)
+        here = apart < _COPY
+        rows = np.flatnonzero(here.any(axis=1) & (~feet.found | (feet.distances > _COPY)))
+        if not len(rows):
+            return feet
+        near = np.where(here[rows], near[rows], 0)
+        alike = np.where(here[rows], np.einsum("pi,pki->pk", normals[rows], self._normals[near]), -1.0)
+        alike[((sides[rows][:, None] * self.sides[near]) < 0).any(axis=2)] = -1.0
+        best = alike.argmax(axis=1)
+        good = alike[np.arange(len(rows)), best] > _ALIKE
+        rows, vertices = rows[good], near[np.arange(len(rows)), best][good]
+        faces, weights, places, distances = (one.copy() for one in (feet.faces, feet.weights, feet.points,
+                                                                    feet.distances))
+        faces[rows] = self._face_of[vertices]
+        weights[rows] = self.template.faces[faces[rows]] == vertices[:, None]
+        places[rows] = self.template.vertices[vertices]
+        distances[rows] = np.linalg.norm(points[rows] - places[rows], axis=1)
+        return Feet(faces, weights, places, distances)
 
 
 def register(surface: Surface, sides: NDArray, landmarks: sparse.csr_array, targets: NDArray,
@@ -88,7 +123,7 @@ def register(surface: Surface, sides: NDArray, landmarks: sparse.csr_array, targ
     n = len(surface.vertices)
     smooth, stay = hinge_energy(surface), dirichlet(surface)
     area = np.maximum(surface.vertex_areas, 1e-6 * surface.vertex_areas.mean())
-    x = surface.vertices.copy()
+    x, factor = surface.vertices.copy(), None
     for step in steps:
         for _ in range(step.repeat):
             pull = np.zeros(n)
@@ -104,6 +139,6 @@ def register(surface: Surface, sides: NDArray, landmarks: sparse.csr_array, targ
             matrix = energy + sparse.diags_array(pull + floor) + hold * (landmarks.T @ landmarks)
             right = pull[:, None] * (goal - surface.vertices)
             right += hold * (landmarks.T @ (targets - landmarks @ surface.vertices))
-            u = Factor(matrix, what="the registration of the avatar").solve(right)
-            x = surface.vertices + u
+            factor = Factor(matrix, what="the registration of the avatar", spent=factor)
+            x = surface.vertices + factor.solve(right)
     return x

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import cache, lru_cache
 from pathlib import Path
 
@@ -14,10 +14,14 @@ from facegen.data import meshes_dir
 from facegen.errors import FileError, InputError, nearest
 from facegen.face.face import load_face
 from facegen.fileio.avatar import AvatarFile, check_output, load_avatar, save_avatar
+from facegen.fileio.kept import kept_in
+from facegen.transfer.halfway import half_name
 from facegen.transfer.landmarks import check_places, load_landmarks
 from facegen.transfer.pieces import describe
 from facegen.transfer.template import Template, template_of
+from facegen.transfer.template_file import read_template
 from facegen.transfer.transfer import Transferred, transfer
+from facegen.transfer.weights import WeightsLike, read_weights
 
 DEFAULT_SETS = ("units", "arkit", "visemes")
 """What an avatar gets unless told otherwise: the units make every expression, the others are what programs ask for."""
@@ -25,12 +29,14 @@ DEFAULT_SETS = ("units", "arkit", "visemes")
 
 @dataclass(frozen=True, eq=False)
 class Rigged:
-    """``path`` of the file written, ``names`` of its shapes, ``warnings``, and ``found``: how the transfer went."""
+    """``path`` of the file written, ``names`` of its shapes, ``warnings``, ``found``: how the transfer
+    went, and ``avatar``: what was written, as it is read again."""
 
     path: Path
     names: tuple[str, ...]
     warnings: tuple[str, ...]
     found: Transferred
+    avatar: AvatarFile
 
     @property
     def pieces(self) -> list[dict[str, object]]:
@@ -49,15 +55,20 @@ def avatar_names() -> tuple[str, ...]:
 
 
 def rig(avatar: str | Path, output: str | Path, *, landmarks: str | Path | None = None,
-        sets: Sequence[str] = DEFAULT_SETS, person: str | Path | None = None, method: str = "landmarks",
-        opening: float = 1.0, pieces: Mapping[str, str] | None = None, normals: bool = True,
-        quantise: bool = False) -> Rigged:
+        sets: Sequence[str] | None = None, shapes: Sequence[str] | None = None, person: str | Path | None = None,
+        template: str | Path | None = None, template_landmarks: str | Path | None = None, method: str = "landmarks",
+        weights: WeightsLike | None = None, opening: float = 1.0, pieces: Mapping[str, str] | None = None,
+        normals: bool = True, quantise: bool = False, cache: bool = True) -> Rigged:
     """Give an avatar blendshapes and write it.
 
     avatar: the path of a .obj, .glb, .gltf, .vrm, .ply or .stl file, or a shipped avatar's name. output: .glb (or
     .gltf, .vrm), .npz, or a folder for a sequence of OBJ files. landmarks: their file; a shipped avatar has its own.
-    sets: vocabularies, see `shape_sets`. person: whose habits override expressions. method, opening, pieces: as in
-    `transfer`. normals, quantise: as in `save_avatar`. Raises InputError and its children; nothing is written then. ::
+    sets: vocabularies, see `shape_sets`; `DEFAULT_SETS` without. shapes: only those of these names. person: whose
+    habits override expressions. template, template_landmarks: another face that has shapes, instead of facegen's own
+    and its sets, see `read_template`. method, opening, pieces: as in `transfer`; weights: as `read_weights`
+    takes them. normals, quantise: as in `save_avatar`. cache: use again how the skin was laid on the template, kept in
+    the user's cache folder, if avatar, landmarks, pieces and template are the same. Raises InputError and its children;
+    nothing is written then. ::
 
         facegen.rig("cat.obj", "cat.glb", landmarks="cat.yaml")
         facegen.load_face("cat.glb").pose("happiness")
@@ -71,19 +82,56 @@ def rig(avatar: str | Path, output: str | Path, *, landmarks: str | Path | None 
     if marks is None:
         raise InputError(f"landmarks: expected the file of the avatar's landmarks, got none; write one with the places "
                          f"of eyes, brows, nose, mouth and chin on {path.name} (docs/landmarks.md lists the names)")
-    recipes = shape_sets(sets, person)
+    asked = _asked(sets, shapes, person, template, template_landmarks)
+    chosen = read_weights(weights)
     source = load_avatar(path)
-    check_output(source, output, recipes)
+    check_output(source, output, asked.sets)
     places = load_landmarks(marks, source.mesh, mesh_name=path.name, digest=source.digest)
-    warnings = tuple(check_places(places, source.mesh))
-    template = _template(tuple(recipes.items()))
-    found = transfer(source.mesh, places, template, method=method, opening=opening, pieces=pieces)
-    shapes = {name: found.shapes[name] for name in recipes}
-    expressions = {name: {name: 1.0} for name, recipe in recipes.items() if recipe.set == "vrm"}
-    notes = _notes(source, places.points(source.mesh.vertices), found, recipes)
-    written = save_avatar(source, output, shapes, notes=notes, normals=normals, quantise=quantise,
-                          expressions=expressions if _is_vrm(source) else {})
-    return Rigged(written, tuple(shapes), warnings, found)
+    warnings = [*check_places(places, source.mesh), *_without_expressions(source, asked.sets)]
+    found = transfer(source.mesh, places, asked.template(), method=method, weights=chosen, opening=opening,
+                     pieces=pieces, kept=kept_in("registrations") if cache else None)
+    made = {name: found.shapes[name] for name in asked.sets}
+    made |= {half_name(name): moved for name, moved in found.halves.items() if name in made}
+    expressions = {name: {name: 1.0} for name, kind in asked.sets.items() if kind == "vrm"}
+    notes = _notes(source, places.points(source.mesh.vertices), found, asked.sets)
+    written = save_avatar(source, output, made, notes=notes, normals=normals, quantise=quantise,
+                          expressions=expressions)
+    return Rigged(written, tuple(made), tuple(warnings), found,
+                  replace(source, shapes={**source.shapes, **made}, notes=notes))
+
+
+@dataclass(frozen=True)
+class _Asked:
+    """What is to be made. ``sets``: shape -> the vocabulary it belongs to, empty if unknown; ``template``: makes it."""
+
+    sets: Mapping[str, str]
+    template: Callable[[], Template]
+
+
+def _asked(sets: Sequence[str] | None, shapes: Sequence[str] | None, person: str | Path | None,
+           template: str | Path | None, template_landmarks: str | Path | None) -> _Asked:
+    """Return the shapes to make and the template to make them from, checked: facegen's own face, or a file."""
+    if template is not None:
+        if sets is not None or person is not None:
+            raise InputError(f"{'person' if sets is None else 'sets'}: facegen's own shapes cannot be had from another "
+                             "template, whose shapes go by its own names; leave it out, and choose among them by name "
+                             "(shapes)")
+        file = read_template(template, landmarks=template_landmarks, shapes=shapes)
+        return _Asked({name: file.sets.get(name, "") for name in file.shapes}, file.template)
+    if template_landmarks is not None:
+        raise InputError("template_landmarks: expected a template that they are on, got none (--template)")
+    recipes = shape_sets(DEFAULT_SETS if sets is None else sets, person)
+    wanted = list(recipes) if shapes is None else list(dict.fromkeys(shapes))
+    if not wanted:
+        raise InputError("shapes: expected one or more names, got none")
+    for name in wanted:
+        if name not in recipes:
+            raise InputError(f"shapes: '{name}' is not in the sets that were asked for{nearest(str(name), recipes)} "
+                             "(facegen list shapes)")
+    # A corrective is made from the shape that it corrects, whether or not that is asked for.
+    needed = {*wanted, *(recipes[name].minus for name in wanted)}
+    of = tuple((name, recipe) for name, recipe in recipes.items() if name in needed)
+    return _Asked({name: recipes[name].set for name in wanted}, lambda: _template(of))
 
 
 @lru_cache(maxsize=1)         # many avatars with the same shapes; a template is tens of megabytes
@@ -91,12 +139,16 @@ def _template(recipes: tuple[tuple[str, Recipe], ...]) -> Template:
     return template_of(load_face(), dict(recipes))
 
 
-def _is_vrm(source: AvatarFile) -> bool:
-    return source.path.suffix.lower() == ".vrm"
+def _without_expressions(source: AvatarFile, sets: Mapping[str, str]) -> list[str]:
+    """Return a warning if presets of VRM go into a file that cannot bind them."""
+    if source.is_vrm0 and "vrm" in sets.values():
+        return [f"{source.path.name} is a VRM 0.x avatar: it gets the shapes but no expressions that use them; convert "
+                "it to VRM 1.0 first"]
+    return []
 
 
 def _notes(source: AvatarFile, points: Mapping[str, np.ndarray], found: Transferred,
-           recipes: Mapping[str, Recipe]) -> dict[str, object]:
+           sets: Mapping[str, str]) -> dict[str, object]:
     """Return what facegen keeps in the file, to load it as a face: see facegen.face.avatar_notes."""
     kinds: dict[str, str] = {}
     for piece in found.pieces:
@@ -109,7 +161,8 @@ def _notes(source: AvatarFile, points: Mapping[str, np.ndarray], found: Transfer
         "frame": {"scale": frame.scale, "rotation": frame.rotation.tolist(), "offset": frame.offset.tolist()},
         "landmarks": {name: at.tolist() for name, at in points.items()},
         **({"neck": points["neck"].tolist()} if "neck" in points else {}),
-        "sets": sorted({recipe.set for recipe in recipes.values()}),
-        "shapes": {name: {"set": recipe.set} for name, recipe in recipes.items()},
+        "sets": sorted(set(sets.values()) - {""}),
+        "shapes": {name: {"set": kind} if kind else {} for name, kind in sets.items()},
+        **({"halves": {name: half_name(name) for name in found.halves if name in sets}} if found.halves else {}),
         "pieces": kinds,
     }

@@ -8,12 +8,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from facegen.fileio.kept import Kept
 from facegen.geometry.closest import Feet
 from facegen.geometry.normals import vertex_normals
 from facegen.geometry.operators import Surface
@@ -22,6 +23,7 @@ from facegen.transfer.jaw import JawMotion, avatar_jaw, jaw_share
 from facegen.transfer.part_motion import MEMBERS, PartMotion, part_motion, spread
 from facegen.transfer.refine import BEND, refine
 from facegen.transfer.registration import Correspondence, register
+from facegen.transfer.registration_key import registration_key
 from facegen.transfer.sides import settled, side_fields
 from facegen.transfer.solve import OURS, Transfer, Weights, landmark_matrix
 from facegen.transfer.template import Template, placing
@@ -30,6 +32,8 @@ METHODS = ("landmarks", "sumner", "cloning")
 
 # Millimetres: partners farther than this are none once the skin is registered.
 _REACH = 10.0
+# Millimetres: a file's rounding. The skin of a copy lies this near to the template's.
+_COPY = 1e-3
 # A side's bending is measured on so many shapes at a time, to bound the memory.
 _AT_A_TIME = 16
 # Above this many triangles the avatar is as fine as the template everywhere that matters: the search is left out.
@@ -59,6 +63,14 @@ class Skin:
         """The template's partner of each vertex."""
         return self.correspondence(self.registered, vertex_normals(self.registered, self.surface.faces), self.sides,
                                    reach=_REACH)
+
+    @property
+    def copied(self) -> bool:
+        """Whether the skin is the template's own, vertex for vertex within rounding: it then moves as that does."""
+        feet = self.feet
+        stays = np.abs(self.registered - self.surface.vertices).max() < _COPY
+        at_vertices = feet.weights.max(axis=1) > 1 - _COPY
+        return bool(stays and feet.found.all() and at_vertices.all() and feet.distances.max() < _COPY)
 
     @cached_property
     def parts(self) -> PartMotion:
@@ -123,7 +135,7 @@ class Skin:
         sides, feet = self.sides, self.feet
         places, matrix = self._landmark_motion()
         if len(surface.faces) < _FINE_ENOUGH:
-            fine, fine_registered, made_of = refine(surface, registered, lambda a, b: self._bend(motion, a, b))
+            fine, fine_registered, made_of = refine(surface, registered, partial(self._bend, motion))
             if len(fine.vertices) > len(surface.vertices):
                 surface, registered, sides = fine, fine_registered, made_of @ sides
                 feet = self.correspondence(registered, vertex_normals(registered, surface.faces), sides, reach=_REACH)
@@ -132,17 +144,16 @@ class Skin:
         middles = self.correspondence(shape.corners.mean(axis=1), shape.normals, sides[surface.faces].mean(axis=1),
                                       reach=_REACH)
         matrices, turns = spread(self.parts, template.landmarks, registered)
-        return Transfer(surface, template.surface, feet, middles, matrices, turns, places, matrix, weights)
+        return Transfer(surface, template.surface, feet, middles, matrices, turns, places, matrix, weights, sides)
 
-    def _bend(self, motion: NDArray, a: NDArray, b: NDArray) -> NDArray[np.float64]:
-        """Return how far the motion of the middles of sides a-b is from the mean of their ends', at most, mm."""
-        template = self.template.surface
-        ends_and_middle = self.correspondence.nearest(np.concatenate([a, b, (a + b) / 2]))
-        n = len(template.vertices)
-        weights = sparse.csr_array((ends_and_middle.weights.ravel(), template.faces[ends_and_middle.faces].ravel(),
-                                    np.arange(0, 9 * len(a) + 1, 3)), shape=(3 * len(a), n))
-        one, other, middle = weights[:len(a)], weights[len(a):2 * len(a)], weights[2 * len(a):]
-        difference = sparse.csr_array(middle - (one + other) * 0.5)
+    def _bend(self, motion: NDArray, places: NDArray, sides: NDArray) -> NDArray[np.float64]:
+        """Return how far the motion of the middles of sides (e, 2) between places is from the mean of their ends', at
+        most, mm."""
+        ends, local = np.unique(sides, return_inverse=True)
+        a, b = local.reshape(-1, 2).T
+        at_ends, at_middles = (self._weights(at) for at in (places[ends], places[sides].mean(axis=1)))
+        difference = sparse.csr_array(at_middles - (at_ends[a] + at_ends[b]) * 0.5)
+        n = len(self.template.surface.vertices)
         reach = np.sqrt((motion**2).sum(axis=2)).max(axis=0)            # no side bends more than this allows
         most = abs(difference) @ reach
         mobile = np.flatnonzero(most > BEND)
@@ -153,14 +164,22 @@ class Skin:
             most[mobile] = np.maximum(most[mobile], length.max(axis=1))
         return most
 
+    def _weights(self, places: NDArray) -> sparse.csr_array:
+        """Return the weights (p, n_s) of the template's vertices at what is nearest to places (p, 3)."""
+        template, feet = self.template.surface, self.correspondence.nearest(places)
+        return sparse.csr_array((feet.weights.ravel(), template.faces[feet.faces].ravel(),
+                                 np.arange(0, 3 * len(places) + 1, 3)), shape=(len(places), len(template.vertices)))
+
 
 def lay_skin(template: Template, surface: Surface, places: Mapping[str, tuple[NDArray, NDArray]], *,
-             opening: float = 1.0, registered: NDArray | None = None) -> Skin:
+             opening: float = 1.0, kept: Kept | None = None) -> Skin:
     """Return the avatar's skin laid on the template.
 
-    surface: the skin in the template's frame, mm. places: its landmarks. registered: from an earlier call with the same
-    skin, landmarks and template, to save the time. Raises InputError where the mesh cannot be solved.
+    surface: the skin in the template's frame, mm. places: its landmarks. kept: where registrations are found again and
+    kept. Raises InputError where the mesh cannot be solved.
     """
+    key = None if kept is None else registration_key(template, surface, places)
+    registered = None if key is None else kept.find(key, surface.vertices.shape)
     correspondence = Correspondence(template.surface, side_fields(template.surface, template.places))
     sides = side_fields(surface, places)
     places = settled(surface, places, sides)
@@ -169,6 +188,8 @@ def lay_skin(template: Template, surface: Surface, places: Mapping[str, tuple[ND
         targets = np.array([template.landmarks[name] for name in names])
         registered = register(surface, sides, placing(places, names, len(surface.vertices)), targets,
                               correspondence)
+        if key is not None:
+            kept.keep(key, registered)
     return Skin(template, surface, places, sides, registered, correspondence, opening)
 
 

@@ -26,8 +26,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from facegen.geometry.closest import Feet
+from facegen.geometry.closest import ClosestPoints, Feet
 from facegen.geometry.factor import Factor
+from facegen.geometry.fade import smooth_step
 from facegen.geometry.operators import Surface, dirichlet, hinge_energy
 from facegen.transfer.part_motion import nearest_rotations
 
@@ -35,9 +36,13 @@ from facegen.transfer.part_motion import nearest_rotations
 _ALONE = 0.05
 # Because each piece that no partner holds would float: everything is tied to its place this much, times the diagonal.
 _TIE = 1e-7
-# A vertex without a partner, in a mouth's lining or on a body, stays where it is with this share of the anchor's
-# weight: the lips' motion is gone two centimetres into the mouth and does not push its walls through the cheeks.
+# A vertex without a partner, in a mouth's depth or on a body, stays where it is with this share of the anchor's weight.
 _STAY = 0.3
+# But a lining, which is without a partner too, moves as the skin over it does, so that it does not come through: wholly
+# where that skin is no thicker than the first, not at all from the second on, mm.
+_THIN, _THICK = 5.0, 20.0
+# Shapes that are solved together, to bound the memory.
+_AT_A_TIME = 16
 # Millimetres over which the trust in a partner fades.
 _FADE = 6.0
 
@@ -61,12 +66,14 @@ class Transfer:
 
     def __init__(self, surface: Surface, template: Surface, feet: Feet, triangle_feet: Feet, matrices: NDArray,
                  turns: NDArray, landmarks: sparse.csr_array, landmark_motion: sparse.csr_array,
-                 weights: Weights = OURS) -> None:
+                 weights: Weights = OURS, sides: NDArray | None = None) -> None:
         """surface, template: the skins. feet: of the avatar's vertices (n,), triangle_feet: of its triangles' middles
-        (m,). matrices (n, 3, 3): M; turns (n, 3, 3): R. landmarks (l, n); landmark_motion (3 l, 3 n_s): M r."""
+        (m,). matrices (n, 3, 3): M; turns (n, 3, 3): R. landmarks (l, n); landmark_motion (3 l, 3 n_s): M r. sides
+        (n, s): `side_fields` of the surface, which keep a lip's lining with its own lip."""
         n, n_s = len(surface.vertices), len(template.vertices)
         trust = 1 / (1 + (np.where(feet.found, feet.distances, 0) / _FADE) ** 2)
-        anchor = weights.anchor * surface.vertex_areas * np.where(feet.found, trust, _STAY)
+        lining, lined = _lining(surface, feet.found, sides)
+        anchor = weights.anchor * surface.vertex_areas * np.where(feet.found, trust, _STAY + (1 - _STAY) * lined)
         share = np.where(triangle_feet.found, 1.0, _ALONE)
         matrix = weights.gradients * dirichlet(surface, share) + sparse.diags_array(anchor)
         if weights.identity:
@@ -79,7 +86,8 @@ class Transfer:
         matrix = matrix + sparse.diags_array(_TIE * matrix.diagonal() + 1e-12 * matrix.diagonal().max())
         self._factor = Factor(matrix, what="the transfer to the avatar")
         right = weights.gradients * self._gradient_part(surface, template, triangle_feet, turns)
-        right = right + self._anchor_part(template, feet, anchor, matrices)
+        pulled = sparse.diags_array(anchor) @ (sparse.diags_array(feet.found.astype(float)) + lining)
+        right = right + sparse.kron(pulled, sparse.identity(3), format="csr") @ self._carried(template, feet, matrices)
         if weights.landmarks:
             spread = sparse.kron(landmarks.T, sparse.identity(3, format="csr"), format="csr")
             right = right + weights.landmarks * (spread @ landmark_motion)
@@ -105,11 +113,11 @@ class Transfer:
         return sparse.coo_array((values.ravel(), (rows.ravel(), columns.ravel())), shape=(3 * n, 3 * n_s)).tocsr()
 
     @staticmethod
-    def _anchor_part(template: Surface, feet: Feet, anchor: NDArray, matrices: NDArray) -> sparse.csr_array:
-        """Return the matrix (3 n, 3 n_s) of the anchor: weight times M r at the partner."""
-        n, n_s = len(anchor), len(template.vertices)
-        v = np.flatnonzero(feet.found & (anchor > 0))
-        values = anchor[v, None, None, None] * matrices[v][:, :, None, :] * feet.weights[v][:, None, :, None]
+    def _carried(template: Surface, feet: Feet, matrices: NDArray) -> sparse.csr_array:
+        """Return the matrix (3 n, 3 n_s) that gives each vertex M r of its partner, and nothing without one."""
+        n, n_s = len(matrices), len(template.vertices)
+        v = np.flatnonzero(feet.found)
+        values = matrices[v][:, :, None, :] * feet.weights[v][:, None, :, None]
         rows = np.broadcast_to((3 * v[:, None] + np.arange(3))[:, :, None, None], values.shape)
         columns = 3 * template.faces[feet.faces[v]][:, :, None] + np.arange(3)
         columns = np.broadcast_to(columns[:, None], values.shape)
@@ -118,9 +126,14 @@ class Transfer:
     def solve(self, motion: NDArray) -> NDArray[np.float64]:
         """Return the avatar's displacements (k, n, 3) for the template's (k, n_s, 3)."""
         n, n_s = self._shape
-        k = len(motion)
-        right = self._right @ np.ascontiguousarray(motion.reshape(k, 3 * n_s).T)            # (3 n, k)
-        return np.ascontiguousarray(np.moveaxis(self._factor.solve(right.reshape(n, 3 * k)).reshape(n, 3, k), 2, 0))
+        result = np.empty((len(motion), n, 3))
+        for start in range(0, len(motion), _AT_A_TIME):
+            some = motion[start:start + _AT_A_TIME]
+            k = len(some)
+            right = self._right @ np.ascontiguousarray(some.reshape(k, 3 * n_s).T)          # (3 n, k)
+            solved = self._factor.solve(right.reshape(n, 3 * k))
+            result[start:start + k] = np.moveaxis(solved.reshape(n, 3, k), 2, 0)
+        return result
 
 
 def rotation_between(a: NDArray, b: NDArray) -> NDArray[np.float64]:
@@ -148,3 +161,19 @@ def landmark_matrix(places: Mapping[str, tuple[NDArray, NDArray]], names: tuple[
     rows = np.broadcast_to((3 * np.arange(len(names))[:, None] + np.arange(3))[:, :, None, None], values.shape)
     columns = np.broadcast_to((3 * vertices[:, :, None] + np.arange(3))[:, None], values.shape)
     return sparse.coo_array((values.ravel(), (rows.ravel(), columns.ravel())), shape=(3 * len(names), 3 * n_s)).tocsr()
+
+
+def _lining(surface: Surface, found: NDArray, sides: NDArray | None) -> tuple[sparse.csr_array, NDArray]:
+    """Return, for vertices that have no partner (n,), the weights (n, n) of those of the skin over them, and how much
+    they go with it (n,), which is what their weights sum to."""
+    n = len(found)
+    over, lone = surface.faces[found[surface.faces].all(axis=1)], np.flatnonzero(~found)
+    if not len(over) or not len(lone):
+        return sparse.csr_array((n, n)), np.zeros(n)
+    labels = None if sides is None else (sides[lone], sides[over].mean(axis=1))
+    feet = ClosestPoints(Surface(surface.vertices, over))(surface.vertices[lone], labels=labels)
+    lined = np.zeros(n)
+    lined[lone] = smooth_step((_THICK - np.where(feet.found, feet.distances, np.inf)) / (_THICK - _THIN))
+    values = lined[lone, None] * feet.weights
+    rows = np.repeat(lone, 3)
+    return sparse.csr_array((values.ravel(), (rows, over[feet.faces].ravel())), shape=(n, n)), lined

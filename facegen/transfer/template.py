@@ -1,7 +1,7 @@
 """The source of a transfer: a neutral skin, its landmarks, and how it moves in every shape.
 
-The parametric face knows more of a shape than its vertices: how far the jaw turned and where the eyes look. A template
-from a file knows its vertices only.
+The parametric face knows more of a shape than its vertices: how far the jaw turned and where the eyes look. On a
+template from a file (template_file) that is measured.
 """
 
 from __future__ import annotations

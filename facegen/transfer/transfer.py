@@ -7,29 +7,28 @@ pieces as what they are, and back.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from facegen.errors import InputError, nearest
-from facegen.geometry.closest import ClosestPoints
+from facegen.fileio.kept import Kept
 from facegen.geometry.mesh import Mesh
-from facegen.geometry.operators import Surface
 from facegen.transfer.alignment import Similarity, align
-from facegen.transfer.baselines import PaperWeights
+from facegen.transfer.apart import take_apart
 from facegen.transfer.closing import closing
 from facegen.transfer.eyeball import EyeFront
+from facegen.transfer.halfway import halfway
 from facegen.transfer.keep_apart import Contact, keep_apart
 from facegen.transfer.landmarks import Landmarks
 from facegen.transfer.margins import LIDS, LIPS
 from facegen.transfer.piece_motion import PieceMotion, RigidMotions
-from facegen.transfer.pieces import Piece, face_names, find_pieces
+from facegen.transfer.pieces import Piece
 from facegen.transfer.skin import METHODS, Skin, lay_skin
-from facegen.transfer.solve import Weights
 from facegen.transfer.template import Template
-from facegen.transfer.weld import weld
+from facegen.transfer.weights import AnyWeights
 
 # The jaw of an avatar opens between these shares of what is estimated; more is a mistake.
 _LEAST_OPENING, _MOST_OPENING = 0.1, 3.0
@@ -39,91 +38,68 @@ _LEAST_OPENING, _MOST_OPENING = 0.1, 3.0
 class Transferred:
     """``shapes``: name -> displacement (n, 3) of the avatar's own vertices, in its own axes and units. ``frame``: from
     there to the template's. ``skin``, ``pieces``: what the avatar was taken for; ``contacts``: how far eyes and teeth
-    went through the skin before and after they were kept apart, mm."""
+    went through the skin before and after they were kept apart, mm. ``halves``: shape -> its corrective half way, see
+    `halfway`."""
 
     shapes: Mapping[str, NDArray]
     frame: Similarity
     skin: Skin
     pieces: tuple[Piece, ...]
     contacts: Mapping[str, Contact]
+    halves: Mapping[str, NDArray]
 
 
 def transfer(mesh: Mesh, landmarks: Landmarks, template: Template, *, method: str = "landmarks",
-             weights: Weights | PaperWeights | None = None, opening: float = 1.0,
-             pieces: Mapping[str, str] | None = None) -> Transferred:
+             weights: AnyWeights | None = None, opening: float = 1.0,
+             pieces: Mapping[str, str] | None = None, kept: Kept | None = None) -> Transferred:
     """Return the template's shapes on an avatar.
 
     mesh: the avatar, in any axes and units. landmarks: on it. method: "landmarks" (ours), or a published one to compare
-    with: "sumner", "cloning". weights: of the energies; `PAPER` holds the paper's. opening: a factor on how far the jaw
-    opens. pieces: part, material or number of a component -> kind. Raises InputError for what cannot be used: unknown
-    names, a mesh that cannot be solved.
+    with: "sumner", "cloning". weights: of the energies, see `read_weights`; ours without. opening: a factor on how
+    far the jaw opens. pieces: part, material or number of a component -> kind. kept: where registrations are kept
+    and found again. Raises InputError for what cannot be used: unknown names, a mesh that cannot be solved.
     """
     if method not in METHODS:
         raise InputError(f"method: expected {', '.join(METHODS)}, got {method!r}{nearest(str(method), METHODS)}")
+    if weights is not None and method != "landmarks":
+        raise InputError(f"weights: the method '{method}' has none to choose; leave them out, or the method")
     if not _LEAST_OPENING <= opening <= _MOST_OPENING:
         raise InputError(f"opening: expected a factor of {_LEAST_OPENING} to {_MOST_OPENING}, got {opening!r}")
     frame = align(landmarks.points(mesh.vertices), template.landmarks)
-    turned = frame.apply(mesh.vertices)
-    places = landmarks.points(turned)
-    vertices, own = weld(turned, mesh.faces)
-    faces = own[mesh.faces]
-    found = find_pieces(vertices, faces, places, names=face_names(mesh), explicit=pieces)
-    rows, surface = _skin_surface(vertices, faces, found)
-    skin = lay_skin(template, surface, _skin_places(landmarks, own, rows, surface, places, template), opening=opening)
-    motion = np.zeros((len(template.names), len(vertices), 3))
-    motion[:, rows] = skin.motion(method, weights)
+    parts = take_apart(mesh, landmarks, frame, explicit=pieces)
+    vertices, found, rows = parts.vertices, parts.pieces, parts.rows
+    skin = lay_skin(template, parts.surface, parts.places(template.places), opening=opening, kept=kept)
+    on_skin = skin.motion(method, weights)
     contacts: Mapping[str, Contact] = {}
-    if method == "landmarks":
-        moved = PieceMotion(found, vertices, faces, places)
+    halves: Mapping[int, NDArray] = {}
+    if method != "landmarks":
+        motion = _among_all(on_skin, rows, len(vertices))
+    else:
+        moved = PieceMotion(found, vertices, parts.faces, parts.points)
         fronts = {f"eye_{s}": EyeFront(ball, vertices[moved.rows(f"eye_{s}")]) for s, ball in moved.eyes.items()}
         slits = [slit for slit in (closing(skin, slit, fronts.get(slit.name)) for slit in (*LIDS, LIPS)) if slit]
-        _on_skin(motion, rows, [slit.close for slit in slits])
+        slits = [] if skin.copied else slits        # a copy closes as the template does: there is nothing to mend
+        for slit in slits:
+            slit.close(on_skin)
         jaw = None if skin.jaw is None else RigidMotions.of(lambda at: skin.jaw.movement(at, template.jaw))
-        motion = moved.move(motion, jaw, template.gaze)
+        motion = moved.move(_among_all(on_skin, rows, len(vertices)), jaw, template.gaze)
         motion, contacts = keep_apart(moved, motion, template.gaze)
-        _on_skin(motion, rows, [slit.seal for slit in slits])
-    result = motion.copy()
-    for row, other in enumerate(template.minus):
-        if other >= 0:
-            result[row] -= motion[other]
-    back = frame.inverse()
-    shapes = {name: back.apply_vectors(result[row][own]) for row, name in enumerate(template.names)}
-    return Transferred(shapes, frame, skin, found, contacts)
+        if skin.copied:             # whatever pokes through it there
+            motion[:, rows] = on_skin
+        for slit in slits:
+            slit.seal(motion, rows)
+        lids = [slit for slit in slits if slit.eye is not None]
+        still = ~(template.jaw.any(axis=1) | template.gaze.any(axis=1))
+        halves = halfway(moved, lids, rows, motion, still)
+    back, shapes = frame.inverse(), {}
+    for name, shape, other in zip(template.names, motion, template.minus, strict=True):
+        shapes[name] = back.apply_vectors(shape if other < 0 else shape - motion[other])[parts.own]
+    bent = {template.names[k]: back.apply_vectors(one)[parts.own] for k, one in halves.items()}
+    return Transferred(shapes, frame, skin, found, contacts, bent)
 
 
-def _on_skin(motion: NDArray, rows: NDArray, steps: Sequence[Callable[[NDArray], None]]) -> None:
-    """Apply steps that change the skin's displacements (k, rows, 3) in place."""
-    skin = motion[:, rows]
-    for step in steps:
-        step(skin)
-    motion[:, rows] = skin
-
-
-def _skin_surface(vertices: NDArray, faces: NDArray, pieces: tuple[Piece, ...]) -> tuple[NDArray, Surface]:
-    """Return the skin's vertices (n,) among all, and its surface over them."""
-    triangles = faces[np.concatenate([piece.faces for piece in pieces if piece.kind == "skin"])]
-    flat = (triangles == np.roll(triangles, 1, axis=1)).any(axis=1)         # what welding made lines of
-    rows, local = np.unique(triangles[~flat], return_inverse=True)
-    return rows, Surface(vertices[rows], local.reshape(-1, 3).astype(np.int32))
-
-
-def _skin_places(landmarks: Landmarks, own: NDArray, rows: NDArray, surface: Surface, places: Mapping[str, NDArray],
-                 template: Template) -> dict[str, tuple[NDArray, NDArray]]:
-    """Return the landmarks as vertices of the skin and weights: their own triangle where that is skin, else the nearest
-    place (brows are often pieces of their own)."""
-    local = np.full(own.max() + 1, -1)
-    local[rows] = np.arange(len(rows))
-    result, elsewhere = {}, []
-    for name, corners, weights in zip(landmarks.names, landmarks.corners, landmarks.barycentric, strict=True):
-        if name not in template.places:
-            continue
-        here = local[own[corners]]
-        if (here[weights > 0] >= 0).all():
-            result[name] = (np.maximum(here, 0), weights)
-        else:
-            elsewhere.append(name)
-    if elsewhere:
-        feet = ClosestPoints(surface)(np.array([places[name] for name in elsewhere]))
-        result |= {name: (surface.faces[face], weights)
-                   for name, face, weights in zip(elsewhere, feet.faces, feet.weights, strict=True)}
-    return result
+def _among_all(on_skin: NDArray, rows: NDArray, n: int) -> NDArray[np.float64]:
+    """Return the displacements (k, n, 3) of all vertices, where those in ``rows`` are the skin's."""
+    motion = np.zeros((len(on_skin), n, 3))
+    motion[:, rows] = on_skin
+    return motion

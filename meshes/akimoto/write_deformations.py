@@ -34,6 +34,14 @@ units: face
 deformations:
 '''
 
+
+
+def both(name: str, factor: float) -> dict[str, float]:
+    """Return a fit of both sides at once. Because measured one-sided units take the other side along, the mouth's by up
+    to a third, units of the mouth's sides are the halves of both."""
+    return {f"{name}Left": factor, f"{name}Right": factor}
+
+
 # unit -> how it is made. fit: {measured unit: factor}; half: split a bilateral measurement into the left half;
 # sealed: the lips stay together; jaw (degrees or mm), lids (upper, lower), folds; by_hand: point -> vector, mm;
 # reach: mm over which a hand-drawn movement fades; axes: factor on x, y, z.
@@ -45,13 +53,13 @@ UNITS: dict[str, dict] = {
     "6": {"fit": {"cheekSquintLeft": 1.0}, "lids": (0.0, 0.13), "margin": False,
           "folds": {"crows_feet_L": 1.0, "under_eye_L": 0.8}},
     "7": {"fit": {"eyeSquintLeft": 1.0}, "lids": (0.04, 0.43), "margin": False, "folds": {"under_eye_L": 0.4}},
-    "9": {"fit": {"noseSneerLeft": 0.90}, "folds": {"nose_root": 0.5, "nasolabial_L": 0.5}},
-    "10": {"fit": {"mouthUpperUpLeft": 1.0}, "open": True, "folds": {"nasolabial_L": 0.7}},
+    "9": {"fit": both("noseSneer", 0.90), "half": True, "folds": {"nose_root": 0.5, "nasolabial_L": 0.5}},
+    "10": {"fit": both("mouthUpperUp", 1.0), "half": True, "open": True, "folds": {"nasolabial_L": 0.7}},
     "11": {"by_hand": {"nasolabial_upper_L": (1.0, 2.4, 1.6), "nose_wing_L": (0.5, 0.9, 0), "nose_wing_base_L": (.5, 1, 0),
                        "cheek_inner_L": (0.4, 1.6, 1.2), "nasolabial_L": (1.0, 1.8, 0.6), "mouth_corner_L": (1.0, 1.5, 0),
                        "lip_upper_surround_outer_L": (0.9, 1.6, 0.1), "lip_lower_outer_L": (0.8, 1.1, 0),
                        "lip_upper_outer_L": (0.8, 1.1, 0)}, "reach": 7.0, "folds": {"nasolabial_L": 1.0}},
-    "12": {"fit": {"mouthSmileLeft": 0.95}, "folds": {"nasolabial_L": 0.8, "crows_feet_L": 0.25}},
+    "12": {"fit": both("mouthSmile", 0.95), "half": True, "folds": {"nasolabial_L": 0.8, "crows_feet_L": 0.25}},
     "13": {"by_hand": {"mouth_corner_L": (2.0, 5.1, -1.3), "lip_upper_border_side_L": (0.8, -0.6, -0.3),
                        "lip_lower_border_side_L": (1.4, 1.1, -1.2), "lip_upper_border_outer_L": (1.6, 2.0, -0.6),
                        "lip_lower_border_outer_L": (2.0, 3.4, -1.4), "lip_upper_outer_L": (1.7, 3.4, -1.0),
@@ -60,9 +68,9 @@ UNITS: dict[str, dict] = {
                        "lip_lower_inner_L": (0.3, 0, -0.1), "lip_upper": (0, 0, 0), "lip_lower": (0, 0, 0), "nose_wing_L": (0, -0.6, 0.2), "mouth_surround_L": (2.2, 4.9, -0.5),
                        "modiolus_L": (2.0, 4.2, 1.4), "buccal_upper_L": (1.2, 2.2, 2.6), "nasolabial_L": (1.2, 2.2, 1.6),
                        "buccal_lower_L": (1.0, 1.4, 0.6)}, "reach": 8.0, "folds": {"nasolabial_L": 0.6}},
-    "14": {"fit": {"mouthDimpleLeft": 0.92}, "axes": (0.85, 1, 1), "folds": {"nasolabial_L": 0.25}},
+    "14": {"fit": both("mouthDimple", 0.92), "half": True, "axes": (0.85, 1, 1), "folds": {"nasolabial_L": 0.25}},
     "15": {"fit": {"mouthFrownLeft": 1.05}},
-    "16": {"fit": {"mouthLowerDownLeft": 1.55}, "open": True},
+    "16": {"fit": both("mouthLowerDown", 1.55), "half": True, "open": True},
     "17": {"fit": {"mouthShrugLower": 1.1}, "folds": {"chin": 1.0}},
     "18": {"fit": {"mouthPucker": 1.0}},
     "19": {"by_hand": {"tongue_tip": (0, -1.0, 46.0), "lip_lower": (0, -2.2, 0.6), "lip_lower_border": (0, -2.0, 0.8),
@@ -70,7 +78,7 @@ UNITS: dict[str, dict] = {
                        "lip_upper": (0, 1.4, 0.4), "lip_upper_inner_L": (0, 1.3, 0.4), "lip_upper_side_L": (0, 0.8, 0.2),
                        "lip_lower_border_side_L": (0, -1.2, 0.4)},
            "reach": 4.0, "jaw": {"open": 11.0}},
-    "20": {"fit": {"mouthStretchLeft": 1.2}},
+    "20": {"fit": both("mouthStretch", 1.2), "half": True},
     "21": {"by_hand": {"throat_L": (4.5, -1.0, 3.5), "neck_side_L": (3.0, -1.5, 2.5), "throat": (0, -0.5, -1.5),
                        "jaw_under_L": (1.2, -1.6, 0.4), "jaw_body_L": (0.8, -1.6, 0), "mouth_corner_L": (1.2, -1.6, -0.6),
                        "lip_lower_outer_L": (0.8, -0.9, -0.3), "lip_upper_outer_L": (0.8, -0.9, -0.3),

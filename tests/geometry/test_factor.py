@@ -43,3 +43,14 @@ def test_what_cannot_be_solved_is_refused_by_name(broken):
         path = path * np.nan
     with pytest.raises(InputError, match=r"the jaw (is singular|cannot be solved)"):
         Factor(sparse.csc_array(path), what="the jaw")
+
+
+@pytest.mark.usefixtures("either")
+@pytest.mark.parametrize("places", ["same", "others"])
+def test_a_spent_factor_changes_nothing_but_the_time(places):
+    first = stiff()
+    second = first * 2.0 + sparse.diags_array(np.linspace(1, 2, 60)) if places == "same" else stiff(seed=1)
+    right = np.random.default_rng(2).normal(size=(60, 3))
+    again = Factor(second, spent=Factor(first)).solve(right)
+    assert np.allclose(again, Factor(second).solve(right), rtol=1e-12, atol=1e-12 * np.abs(again).max())
+    assert np.allclose(second @ again, right, atol=1e-8)

@@ -81,3 +81,10 @@ def test_components_are_counted():
 
 def test_vertex_areas_add_up():
     assert grid(4, jitter=0.3).vertex_areas.sum() == pytest.approx(1.0)
+
+
+def test_triangles_of_one_place_twice_or_thrice_add_nothing():
+    points = np.array([[0.0, 0, 0], [0, 0, 0], [0, 0, 0], [1, 0, 0]])
+    u = Surface(points, np.array([[0, 1, 3], [1, 0, 2]], np.int32))
+    assert np.isfinite(hinge_energy(u).toarray()).all()
+    assert np.isfinite(dirichlet(u).toarray()).all()

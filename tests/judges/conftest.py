@@ -13,7 +13,7 @@ import subprocess
 from pathlib import Path
 
 import pytest
-from rigged import missing
+from rigged import missing, rigged_cartoon
 
 HERE = Path(__file__).parent
 
@@ -27,6 +27,12 @@ def judges() -> Path:
     if shutil.which("node") is None:
         missing("node is not installed")
     return Path(folder)
+
+
+@pytest.fixture(scope="session")
+def cartoon(tmp_path_factory):
+    """A shipped avatar that facegen rigged: its file, the avatar before, and its shapes."""
+    return rigged_cartoon(tmp_path_factory.mktemp("cartoon"))
 
 
 @pytest.fixture

@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
+import base64
+import io
 import os
 import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
+from PIL import Image
+from scipy.spatial import cKDTree
 
+from facegen.data import meshes_dir
 from facegen.fileio.avatar import AvatarFile, load_avatar, save_avatar
 from facegen.geometry.mesh import Mesh, merge
+from facegen.transfer.rig import rig
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "fileio"))
 import gltfs
@@ -21,6 +27,11 @@ def missing(what: str) -> None:
     if os.environ.get("FACEGEN_CI"):
         pytest.fail(f"{what}: must be installed where FACEGEN_CI is set")
     pytest.skip(what)
+
+
+def picture(uri: str) -> np.ndarray:
+    """Return a picture (h, w, 3) from its data: URI."""
+    return np.asarray(Image.open(io.BytesIO(base64.b64decode(uri.partition(",")[2]))).convert("RGB")).astype(float)
 
 
 def bumps(vertices: np.ndarray, count: int = 6, seed: int = 1) -> dict[str, np.ndarray]:
@@ -35,6 +46,25 @@ def bumps(vertices: np.ndarray, count: int = 6, seed: int = 1) -> dict[str, np.n
     shapes["all"] = rng.normal(size=vertices.shape) * 0.01 * size
     shapes["nothing"] = np.zeros_like(vertices)
     return shapes
+
+
+SHAPES = ("eyeBlinkLeft", "eyeLookOutRight", "jawOpen", "mouthSmileLeft", "browInnerUp", "cheekPuff", "tongueOut")
+
+
+def rigged_cartoon(folder: Path) -> tuple[Path, AvatarFile, dict[str, np.ndarray]]:
+    """Return a whole shipped avatar, rigged: its file, the avatar before, and its shapes."""
+    made = rig("cartoon", folder / "cartoon.glb", sets=["arkit"], shapes=SHAPES)
+    return made.path, load_avatar(meshes_dir() / "avatars/cartoon/cartoon.obj"), \
+        {name: made.found.shapes[name] for name in SHAPES}
+
+
+def rows_of(avatar: AvatarFile, name: str, points: np.ndarray) -> tuple[np.ndarray, float]:
+    """Return which vertices of the avatar's part that an object's name begins with lie nearest to points, and how far
+    the farthest is."""
+    part = max((part for part in avatar.mesh.parts if name.startswith(part)), key=len)
+    own = avatar.mesh.part_vertices(part)
+    away, rows = cKDTree(avatar.mesh.vertices[own]).query(points)
+    return own[rows], float(away.max())
 
 
 def figure() -> AvatarFile:

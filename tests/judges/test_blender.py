@@ -11,26 +11,34 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from rigged import written
+from rigged import rows_of, written
 
 PYTHON = os.environ.get("FACEGEN_BPY") or (sys.executable if importlib.util.find_spec("bpy") else None)
 
 
-@pytest.mark.skipif(PYTHON is None, reason="bpy is not installed; FACEGEN_BPY may name a Python that has it")
+pytestmark = pytest.mark.skipif(PYTHON is None,
+                                reason="bpy is not installed; FACEGEN_BPY may name a Python that has it")
+# Blender's axes: x as in glTF, y into the picture, z up.
+TURN = np.array([[1, 0, 0], [0, 0, -1], [0, 1, 0]])
+
+
+def seen_by_blender(path):
+    """Return what blender_look.py finds in a file."""
+    done = subprocess.run([PYTHON, str(Path(__file__).with_name("blender_look.py")), str(path)], capture_output=True,
+                          text=True, timeout=300, check=False)
+    assert done.returncode == 0, done.stdout + done.stderr
+    return json.loads(next(line for line in done.stdout.splitlines() if line.startswith("FOUND"))[6:])
+
+
 @pytest.mark.parametrize(("kind", "quantise"), [
     ("obj", False), ("obj", True), ("instanced", False), ("morphing", False), ("quantised", False),
     ("transformed", False), ("seams", False), ("skin", False)])
 def test_shape_keys(tmp_path, kind, quantise):
     path, avatar, shapes = written(kind, tmp_path, quantise=quantise)
-    done = subprocess.run([PYTHON, str(Path(__file__).with_name("blender_look.py")), str(path)], capture_output=True,
-                          text=True, timeout=300, check=False)
-    assert done.returncode == 0, done.stdout + done.stderr
-    found = json.loads(next(line for line in done.stdout.splitlines() if line.startswith("FOUND"))[6:])
+    found = seen_by_blender(path)
     expected = {**avatar.shapes, **shapes}
     assert {name for one in found.values() for name in one["keys"]} == set(expected)
-    # Blender's axes: x as in glTF, y into the picture, z up.
-    turn = np.array([[1, 0, 0], [0, 0, -1], [0, 1, 0]])
-    points, size = avatar.mesh.vertices @ turn.T, np.ptp(avatar.mesh.vertices, axis=0).max()
+    points, size = avatar.mesh.vertices @ TURN.T, np.ptp(avatar.mesh.vertices, axis=0).max()
     assert set(avatar.mesh.parts) <= set(found)
     for part, one in found.items():
         # Blender shows nodes that stand in no scene, too, and puts a skinned mesh into its bind pose.
@@ -41,4 +49,20 @@ def test_shape_keys(tmp_path, kind, quantise):
         rows = away.argmin(axis=1)
         for name, delta in one["keys"].items():
             if kind != "seams":     # there, places are shared by vertices that move on their own
-                np.testing.assert_allclose(delta, expected[name][rows] @ turn.T, atol=2e-5 * size)
+                np.testing.assert_allclose(delta, expected[name][rows] @ TURN.T, atol=2e-5 * size)
+
+
+def test_a_shipped_avatar_that_facegen_rigged(cartoon):
+    path, avatar, shapes = cartoon
+    found = seen_by_blender(path)
+    size = np.ptp(avatar.mesh.vertices, axis=0).max()
+    assert {name for one in found.values() for name in one["keys"]} == set(shapes)
+    met = dict.fromkeys(shapes, 0.0)
+    for part, one in found.items():
+        rows, away = rows_of(avatar, part, np.array(one["rest"]) @ TURN)
+        assert away < 1e-6 * size
+        for name, delta in one["keys"].items():
+            np.testing.assert_allclose(np.array(delta) @ TURN, shapes[name][rows], atol=2e-6 * size)
+            met[name] = max(met[name], np.abs(delta).max())
+    for name, shape in shapes.items():
+        assert met[name] == pytest.approx(np.abs(shape).max(), abs=2e-6 * size)

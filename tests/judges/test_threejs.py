@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import base64
-import io
 import os
 
 import gltfs
@@ -11,7 +9,7 @@ import numpy as np
 import pytest
 from browser import chromium, seen_by_threejs
 from PIL import Image
-from rigged import missing, written
+from rigged import missing, picture, rows_of, written
 
 
 @pytest.fixture
@@ -20,10 +18,6 @@ def see(judges, tmp_path):
     if chromium() is None:
         missing("Chromium is not installed")
     return lambda path, poses: seen_by_threejs(judges, path, poses, tmp_path / "profile")
-
-
-def picture(uri):
-    return np.asarray(Image.open(io.BytesIO(base64.b64decode(uri.partition(",")[2]))).convert("RGB")).astype(float)
 
 
 def nearest_rows(points, of):
@@ -63,9 +57,36 @@ def test_names_deltas_and_pictures(tmp_path, see, kind, options):
     assert max(changes) > 30
     assert np.count_nonzero(np.array(changes) > 2) >= 3         # some bumps are on the far side
     assert not np.any(picture(seen["pictures"]["nothing"]) - neutral)
+    keep(seen, f"{kind}-{'-'.join(options)}")
+
+
+def test_a_shipped_avatar_that_facegen_rigged(see, cartoon):
+    path, avatar, shapes = cartoon
+    seen = see(path, list(shapes))
+    assert {name for mesh in seen["meshes"] for name in mesh["names"]} == set(shapes)
+    size = np.ptp(avatar.mesh.vertices, axis=0).max()
+    met = dict.fromkeys(shapes, 0.0)
+    for mesh in seen["meshes"]:
+        rows, away = rows_of(avatar, mesh["name"], np.array(mesh["position"]).reshape(-1, 3))
+        assert away < 1e-6 * size
+        for name in mesh["names"]:
+            delta = np.array(mesh["deltas"][name]).reshape(-1, 3)
+            np.testing.assert_allclose(delta, shapes[name][rows], atol=1e-6 * size)
+            met[name] = max(met[name], np.abs(delta).max())
+    for name, shape in shapes.items():
+        assert met[name] == pytest.approx(np.abs(shape).max(), abs=1e-6 * size)
+    neutral = picture(seen["pictures"][""])
+    for name in shapes:
+        changed = np.abs(picture(seen["pictures"][name]) - neutral).max(axis=2) > 10
+        assert changed.mean() > 2e-4, name                      # a glance moves a hundred pixels
+    keep(seen, "cartoon")
+
+
+def keep(seen, name):
+    """Write what was seen where the environment says, to be looked at."""
     if folder := os.environ.get("FACEGEN_KEEP_PICTURES"):
         for pose, uri in seen["pictures"].items():
-            Image.fromarray(picture(uri).astype(np.uint8)).save(f"{folder}/{kind}-{'-'.join(options)}-{pose}.png")
+            Image.fromarray(picture(uri).astype(np.uint8)).save(f"{folder}/{name}-{pose.replace(':', '-')}.png")
 
 
 def test_normals_turn_with_the_surface(tmp_path, see):

@@ -26,6 +26,17 @@ def test_no_error_and_no_warning(tmp_path, validate, kind, options):
         assert complaints(validate(avatar.path)) == []
 
 
+@pytest.mark.parametrize("options", [{}, {"normals": False}, {"quantise": True}],
+                         ids=["full", "positions", "quantised"])
+def test_a_shipped_avatar_that_facegen_rigged(tmp_path, validate, cartoon, options):
+    path, avatar, shapes = cartoon
+    if options:
+        path = save_avatar(avatar, tmp_path / "cartoon.glb", shapes, **options)
+    report = validate(path)
+    assert complaints(report) == []
+    assert report["info"]["drawCallCount"] >= len(avatar.mesh.parts)
+
+
 @pytest.mark.parametrize("kind", ["obj", "shared", "morphing"])
 def test_a_second_time(tmp_path, validate, kind):
     path, _, _ = written(kind, tmp_path)

@@ -10,6 +10,7 @@ from facegen.errors import FileError, InputError
 from facegen.face.face import load_face
 from facegen.fileio.avatar import load_avatar
 from facegen.geometry.mesh import Mesh
+from facegen.transfer.halfway import half_name
 from facegen.transfer.landmarks import Landmarks
 from facegen.transfer.rig import avatar_names, rig
 from facegen.transfer.transfer import transfer
@@ -27,7 +28,23 @@ def face(rigged):
 
 def test_every_shape_that_was_asked_for_is_in_the_file(rigged):
     names = set(load_avatar(rigged.path).shapes)
-    assert names == set(rigged.names) == set(shape_sets(["units", "arkit"]))
+    assert names == set(rigged.names)
+    assert names - {half_name(name) for name in rigged.found.halves} == set(shape_sets(["units", "arkit"]))
+
+
+def test_left_shapes_leave_the_right_side_alone(rigged):
+    """At most 3 % of their mean movement, and two micrometres, but for a strip of 12 mm beside the midline, in the
+    template's shape and in the avatar's own: a muzzle is narrower than a person's mouth."""
+    skin, shapes = rigged.found.skin, load_avatar(rigged.path).shapes
+    rows = cKDTree(rigged.found.frame.apply(load_avatar(rigged.path).mesh.vertices)).query(skin.surface.vertices)[1]
+    x, clear = skin.registered[:, 0], np.abs(skin.surface.vertices[:, 0]) > 12
+    template = skin.template
+    whole = {"mouthLeft", *(name for name, jaw in zip(template.names, template.jaw, strict=True) if jaw.any())}
+    left = [name for name in rigged.names if name.endswith(("_L", "Left")) and name not in whole]
+    assert len(left) > 30
+    for name in left:
+        length = np.linalg.norm(rigged.found.frame.apply_vectors(shapes[name][rows]), axis=1)
+        assert (clear * length)[x < -12].mean() <= 0.03 * length[x > 12].mean() + 0.002, name
 
 
 def test_a_rigged_avatar_is_a_face(rigged, face):

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from remeshing import errors
 
 from facegen.geometry.operators import Surface
 from facegen.transfer.baselines import PAPER
@@ -13,12 +14,6 @@ def test_a_template_transferred_to_itself_gives_itself(template):
     skin = lay_skin(template, template.surface, template.places)
     assert np.abs(skin.registered - template.surface.vertices).max() < 1e-9
     assert np.abs(skin.motion() - template.motion).max() < 1e-6 * template.height
-
-
-def errors(found, true):
-    """Return the RMS error of all shapes and of each, as shares of the motion."""
-    e, t = ((x**2).sum(axis=(1, 2)) for x in (found - true, true))
-    return np.sqrt(e.sum() / t.sum()), np.sqrt(e / t)
 
 
 # A few gazes move the lids by tenths of a millimetre only, where the cornea lifts them; of these no share is asked.

@@ -23,10 +23,11 @@ from chart import Round  # noqa: E402
 from clay import Clay, curve  # noqa: E402
 from cover import in_polygon  # noqa: E402
 from eyes import almond, ellipse, eyeball, lid_rings  # noqa: E402
-from mouth import arch, gum_and_teeth, lip_rows, tongue  # noqa: E402
+from mouth import arch, gum_and_teeth, lip_rows, slit_at, tongue  # noqa: E402
 from numpy.typing import NDArray  # noqa: E402
 from plan import Plan  # noqa: E402
 from saving import both_sides, save_avatar  # noqa: E402
+from scipy.spatial import cKDTree  # noqa: E402
 from sheet import Sheet, mirror_image  # noqa: E402
 
 from facegen.geometry.mesh import Mesh, merge  # noqa: E402
@@ -34,7 +35,8 @@ from facegen.geometry.mesh import Mesh, merge  # noqa: E402
 COLOURS = {
     "fur": (214, 148, 88),
     "fur_light": (242, 234, 222),
-    "fur_pale": (232, 184, 132),
+    "fur_soft": (230, 194, 158),
+    "fur_pale": (228, 174, 120),
     "fur_dark": (172, 104, 56),
     "rim": (66, 44, 38),
     "nose": (214, 132, 126),
@@ -53,41 +55,74 @@ COLOURS = {
     "whiskers": (248, 246, 240),
 }
 LID = 28  # vertices round an eye
-LIP = 9  # quads along half a lip
+LIP = 14  # quads along half a lip
 GAP = 0.012  # between the lips
 DECIMALS = 4
 REACH = 9.0  # farther than any place from the head's middle
 CANDIDATES = 24000
 
 OPENING = almond(LID, 60, 39, 35, point=0.4, inner_drop=9, lean=0.10)
-LID_RINGS = {"offsets": (0.4, 0.2, 0.07), "crest": 1.05, "inside": 1.02, "pocket": 1.4}
-LIP_OFFSETS = (0.3, 0.07)
-# Colours by their outlines seen from the front, left half: (x, y), and the least z.
+LID_RINGS = {"offsets": (0.4, 0.2, 0.09), "edge": 0.07, "crest": 1.05, "inside": 1.02, "pocket": 1.4}
+LIP_OFFSETS = (0.5, 0.3, 0.15, 0.06)
+# The lining's rows: how deep they lie, how much narrower than the lips, how far above and below their seam.
+LINING = (
+    (0.1, 1.0, 0.008, 0.008),
+    (0.2, 0.98, 0.08, 0.1),
+    (0.26, 0.96, 0.32, 0.3),
+    (0.5, 0.91, 0.55, 0.52),
+    (1.1, 0.85, 0.62, 0.66),
+    (2.1, 0.8, 0.66, 0.66),
+    (3.0, 0.7, 0.5, 0.6),
+)
+# Colours by their outlines seen from the front, left half: the least z, and points (x, y) that a smooth curve joins.
+NOSE = (4.0, ((-0.1, -0.48), (0.42, -0.52), (0.66, -0.7), (0.56, -0.98), (0.3, -1.1), (0.1, -1.32), (-0.1, -1.36)))
+STRIPES = (
+    (-1.0, ((-0.1, 2.3), (0.2, 2.3), (0.27, 3.1), (0.2, 4.0), (-0.1, 4.1))),
+    (-1.0, ((0.68, 2.3), (1.12, 2.2), (1.4, 3.1), (1.36, 3.8), (0.95, 3.9), (0.85, 3.1))),
+)
+# The white of blaze, muzzle, cheeks and throat: its edge keeps clear of the mouth's corner, which a smile moves.
+WHITE = (
+    -3.0,
+    (
+        (-0.1, 1.3),
+        (0.09, 1.15),
+        (0.2, 0.5),
+        (0.34, 0.0),
+        (0.62, -0.45),
+        (1.1, -0.78),
+        (1.75, -0.98),
+        (2.45, -1.2),
+        (2.92, -1.7),
+        (2.92, -2.4),
+        (2.5, -3.05),
+        (2.1, -3.7),
+        (1.95, -5.0),
+        (1.9, -9.0),
+        (-0.1, -9.0),
+    ),
+)
+SOFT = 0.26  # width of the band between the white and the fur
+
+
+def smooth(points: tuple) -> NDArray:
+    """Return a smooth line (k, 2) through points, from the middle to the middle."""
+    return curve(points, 40 * len(points))
+
+
+def grown(line: NDArray, by: float) -> NDArray:
+    """Return a line (k, 2) moved to its left by a distance."""
+    along = np.gradient(line, axis=0)
+    along /= np.linalg.norm(along, axis=1, keepdims=True)
+    return line + by * np.stack([-along[:, 1], along[:, 0]], axis=1)
+
+
+WHITE_EDGE = smooth(WHITE[1])
+# What lies before what: name, least z, outline (k, 2).
 PATCHES = (
-    (
-        "nose",
-        3.9,
-        ((-0.1, -0.48), (0.42, -0.52), (0.66, -0.7), (0.56, -0.98), (0.3, -1.1), (0.1, -1.32), (-0.1, -1.36)),
-    ),
-    ("fur_dark", -1.0, ((-0.1, 2.3), (0.2, 2.3), (0.27, 3.1), (0.2, 4.0), (-0.1, 4.1))),
-    ("fur_dark", -1.0, ((0.68, 2.3), (1.12, 2.2), (1.4, 3.1), (1.36, 3.8), (0.95, 3.9), (0.85, 3.1))),
-    (
-        "fur_light",
-        -0.5,
-        (
-            (-0.1, 1.25),
-            (0.14, 1.1),
-            (0.3, 0.2),
-            (0.55, -0.4),
-            (1.05, -0.75),
-            (1.9, -1.15),
-            (2.5, -1.75),
-            (2.6, -2.6),
-            (2.3, -3.4),
-            (2.0, -9.0),
-            (-0.1, -9.0),
-        ),
-    ),
+    ("nose", NOSE[0], np.array(NOSE[1])),
+    *(("fur_dark", least, smooth((*points, points[0]))) for least, points in STRIPES),
+    ("fur_light", WHITE[0], WHITE_EDGE),
+    ("fur_soft", WHITE[0], grown(WHITE_EDGE, SOFT)),
 )
 
 
@@ -98,7 +133,9 @@ def spacing(points: NDArray) -> NDArray:
     )
     reach = np.array([1.5, 0.5, 0.6, 0.5, 0.3])
     away = np.linalg.norm(points[:, None] - features, axis=2) - reach
-    return np.clip(0.24 + 0.16 * np.maximum(away.min(axis=1), 0), 0.24, 0.85)
+    size = np.clip(0.24 + 0.16 * np.maximum(away.min(axis=1), 0), 0.24, 0.85)
+    beside_white = cKDTree(grown(WHITE_EDGE, SOFT / 2)).query(points[:, :2])[0]
+    return np.where(points[:, 2] > WHITE[0], np.minimum(size, 0.28 + 0.5 * beside_white), size)
 
 
 def nostril_loop(clay: Clay, size: float) -> NDArray:
@@ -124,9 +161,7 @@ def neck_loop(clay: Clay) -> NDArray:
 def head(clay: Clay) -> Sheet:
     """Return the skin of the left half."""
     lids = lid_rings(model.EYE, clay, OPENING, **LID_RINGS)
-    slit = clay.onto(curve(model.MOUTH_LINE, LIP + 1), 0.0)
-    slit[0, 0] = 0.0
-    lips = lip_rows(slit, clay, LIP_OFFSETS, gap=GAP)
+    lips = mouth_rows(clay)
     nostril = nostril_loop(clay, 1.0)
     loops = {"eye": lids[0], "mouth": lips[0], "ear": model.EAR.loop(clay), "nostril": nostril, "neck": neck_loop(clay)}
     plan = Plan(clay, Round(model.CENTRE), REACH, spacing, loops)
@@ -139,7 +174,7 @@ def head(clay: Clay) -> Sheet:
     sheet.row(vertices)
     sheet.triangles(faces, colours(vertices[faces].mean(axis=1)))
     add_lids(sheet, rows["eye"], lids)
-    add_mouth(sheet, clay, rows["mouth"], lips, slit)
+    add_mouth(sheet, rows["mouth"], lips)
     model.EAR.add(sheet, rows["ear"], (0.1, 0.24, 0.4, 0.57, 0.74, 0.88), "fur", "inner_pink")
     rings = [nostril_loop(clay, 0.82) - [0, 0, 0.12], nostril_loop(clay, 0.6) - [-0.03, 0, 0.35]]
     last = rows["nostril"]
@@ -151,10 +186,10 @@ def head(clay: Clay) -> Sheet:
     return sheet
 
 
-def patch_edge(clay: Clay, outline: tuple, least: float) -> NDArray:
+def patch_edge(clay: Clay, outline: NDArray, least: float) -> NDArray:
     """Return a dense line on the clay along the edge of a colour."""
-    corners = np.array([*outline, outline[0]], float)
-    flat = np.concatenate([a + np.linspace(0, 1, 40, endpoint=False)[:, None] * (b - a) for a, b in pairwise(corners)])
+    corners = np.concatenate([outline, outline[:1]])
+    flat = np.concatenate([a + np.linspace(0, 1, 12, endpoint=False)[:, None] * (b - a) for a, b in pairwise(corners)])
     flat = flat[(flat[:, 0] > 0.02) & (clay(np.column_stack([flat, np.full(len(flat), least)])) < -0.1)]
     return clay.shoot(np.column_stack([flat, np.full(len(flat), least)]), np.array([[0.0, 0.0, 1.0]]), 8.0)
 
@@ -163,44 +198,53 @@ def colours(middles: NDArray) -> list[str]:
     """Return the material at places (n, 3) of the left half."""
     names = np.full(len(middles), "fur", dtype=object)
     for name, least, outline in PATCHES[::-1]:
-        names[in_polygon(np.array(outline), middles[:, :2]) & (middles[:, 2] > least)] = name
+        names[in_polygon(outline, middles[:, :2]) & (middles[:, 2] > least)] = name
     return list(names)
 
 
 def add_lids(sheet: Sheet, loop: NDArray, rings: list[NDArray]) -> None:
     rows = [loop, *(sheet.row(r) for r in rings[1:])]
-    for a, b, name in zip(rows[:-1], rows[1:], ["fur", "fur_pale", "rim", "rim", "rim", "rim"], strict=True):
+    for a, b, name in zip(rows[:-1], rows[1:], ["fur", "fur_pale", "fur_pale", "rim", "rim", "rim", "rim"], strict=True):
         sheet.band(a, b, name)
 
 
-def add_mouth(sheet: Sheet, clay: Clay, loop: NDArray, rows: list[NDArray], slit: NDArray) -> None:
-    """Add the lips and the lining: it narrows behind the lips, widens to hold teeth and tongue, ends at the throat."""
+def mouth_rows(clay: Clay) -> list[NDArray]:
+    """Return the rows of the left half of the lips, the outermost first."""
+    return lip_rows(slit_at(clay, model.MOUTH_LINE, LIP + 1, model.MOUTH_INSIDE), clay, LIP_OFFSETS, gap=GAP)
+
+
+def add_mouth(sheet: Sheet, loop: NDArray, rows: list[NDArray]) -> None:
+    """Add the lips and the lining: the lips' inner sides touch, then it falls away behind them to hold teeth and
+    tongue, and ends at the throat."""
     numbers = [loop, *(sheet.row(r) for r in rows[1:])]
-    sheet.band(numbers[0], numbers[1], "fur_light", closed=False)
-    sheet.band(numbers[1], numbers[2], "lips", closed=False)
-    share = np.arange(LIP + 1) / LIP
-    bow = np.sqrt(1 - share**2)[:, None]
-    up = np.array([0.0, 1.0, 0.0])
+    for outer, inner in pairwise(numbers):
+        sheet.band(outer, inner, "lips" if inner is numbers[-1] else "fur_light", closed=False)
     last = numbers[-1]
-    for depth, shrink, high, low in (
-        (0.12, 1.0, 0.012, 0.012),
-        (0.3, 0.97, 0.10, 0.10),
-        (0.5, 0.93, 0.5, 0.42),
-        (1.1, 0.86, 0.62, 0.62),
-        (2.1, 0.8, 0.66, 0.66),
-        (3.1, 0.7, 0.5, 0.6),
-    ):
-        inward = np.array([0.0, -1.9, 0.5]) - slit
-        inward = inward / np.linalg.norm(inward, axis=1, keepdims=True)
-        base = slit + depth * np.minimum(1.0, 1.6 - share)[:, None] * inward
-        base[:, 0] *= shrink
-        row = np.concatenate([(base + high * bow * up)[:LIP], base[LIP:], (base - low * bow * up)[:LIP][::-1]])
-        row[[0, -1], 0] = 0.0
+    for number, row in enumerate(lining_rows(rows[-1])):
         row = sheet.row(row)
-        sheet.band(last, row, "lips" if depth < 0.2 else "mouth", closed=False)
+        sheet.band(last, row, "lips" if number == 0 else "mouth", closed=False)
         last = row
     back = sheet.row([0.0, *(sheet.at(last)[[0, -1], 1:].mean(axis=0) - [0, 0.4])])[0]
     sheet.triangles([(a, b, back) for a, b in pairwise(last)], "mouth")
+
+
+def lining_rows(edge: NDArray) -> list[NDArray]:
+    """Return the rows of the lining behind the lips' edge (2 LIP + 1, 3)."""
+    slit = (edge[: LIP + 1] + edge[LIP:][::-1]) / 2
+    share = np.arange(LIP + 1) / LIP
+    bow = np.sqrt(1 - share**2)[:, None]
+    dip = bow**3  # the jaw's side is near below the corner
+    up = np.array([0.0, 1.0, 0.0])
+    inward = np.array([0.0, -1.9, 0.5]) - slit
+    inward = inward / np.linalg.norm(inward, axis=1, keepdims=True)
+    rows = []
+    for depth, shrink, high, low in LINING:
+        base = slit + depth * np.minimum(1.0, 1.6 - share)[:, None] * inward
+        base[:, 0] *= shrink
+        row = np.concatenate([(base + high * bow * up)[:LIP], base[LIP:], (base - low * dip * up)[:LIP][::-1]])
+        row[[0, -1], 0] = 0.0
+        rows.append(row)
+    return rows
 
 
 def whiskers(clay: Clay) -> Sheet:
@@ -258,8 +302,8 @@ def inner_parts() -> list[Mesh]:
             (0.38, (0.3, 0.16, 0.26)),
         )
     ]
-    arch_upper = arch((1.05, -1.72, 2.2), (0.92, -1.72, 3.0), (0.58, -1.7, 3.55), (0, -1.66, 3.8))
-    arch_lower = arch((0.92, -2.62, 2.0), (0.8, -2.64, 2.8), (0.46, -2.62, 3.3), (0, -2.6, 3.5))
+    arch_upper = arch((1.05, -1.72, 2.2), (0.92, -1.72, 3.05), (0.6, -1.7, 3.65), (0, -1.66, 3.9))
+    arch_lower = arch((0.92, -2.62, 2.0), (0.82, -2.64, 2.9), (0.5, -2.62, 3.5), (0, -2.58, 3.72))
     return [
         *eyes,
         gum_and_teeth("teeth_upper", arch_upper, (0, -1, 0), 0.19, upper, lean=0.05).mesh(),
@@ -274,10 +318,8 @@ def inner_parts() -> list[Mesh]:
 
 
 def landmarks(clay: Clay, mesh: Mesh) -> dict[str, int]:
-    lids = lid_rings(model.EYE, clay, OPENING, **LID_RINGS)[3]
-    slit = clay.onto(curve(model.MOUTH_LINE, LIP + 1), 0.0)
-    slit[0, 0] = 0.0
-    lips = lip_rows(slit, clay, LIP_OFFSETS, gap=GAP)
+    lids = lid_rings(model.EYE, clay, OPENING, **LID_RINGS)[-4]
+    lips = mouth_rows(clay)
     front = lambda x, y: clay.shoot(np.array([x, y, 0.0]), np.array([[0.0, 0.0, 1.0]]), 8.0)[0]  # noqa: E731
     side = lambda y, z: clay.shoot(np.array([0.0, y, z]), np.array([[1.0, 0.0, 0.0]]), 8.0)[0]  # noqa: E731
     q, m = LID // 4, LIP
@@ -299,10 +341,10 @@ def landmarks(clay: Clay, mesh: Mesh) -> dict[str, int]:
         "nose_wing_L": front(0.62, -0.85),
         "nose_base": front(0.0, -1.3),
         "mouth_corner_L": lips[-1][m],
-        "mouth_top": lips[1][0],
+        "mouth_top": lips[-2][0],
         "mouth_inner_top": lips[-1][0],
         "mouth_inner_bottom": lips[-1][-1],
-        "mouth_bottom": lips[1][-1],
+        "mouth_bottom": lips[-2][-1],
         "mouth_upper_L": lips[-1][m // 2],
         "mouth_lower_L": lips[-1][2 * m - m // 2],
         "chin": front(0.0, -3.05),

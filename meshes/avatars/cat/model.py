@@ -12,13 +12,14 @@ EYE = Eye.looking((1.88, 0.55, 2.02), 1.22, yaw=11.0, pitch=0.0, roll=16.0)
 BALL = Eye.looking(EYE.centre, EYE.radius, yaw=11.0, pitch=0.0)  # the pupil stands upright
 # The line where the lips meet, from the middle to the left corner.
 MOUTH_LINE = (
-    (0.0, -1.98, 4.9),
-    (0.35, -2.2, 4.9),
-    (0.85, -2.37, 4.6),
-    (1.4, -2.36, 4.1),
-    (1.85, -2.1, 3.4),
-    (2.1, -1.82, 2.75),
+    (0.0, -1.97, 4.5),
+    (0.36, -2.2, 4.5),
+    (0.8, -2.4, 4.34),
+    (1.25, -2.36, 3.97),
+    (1.62, -2.17, 3.48),
+    (1.95, -1.88, 2.88),
 )
+MOUTH_INSIDE = (0.0, -1.5, 1.5)
 NOSE_TIP = (0.0, -0.95, 4.95)
 CENTRE = np.array([0.0, -0.6, 0.6])
 NECK_PLANE = (np.array([0.0, -4.6, -2.6]), np.array([0.0, -0.85, -0.53]))
@@ -32,15 +33,15 @@ def clay() -> Clay:
     c.add(stroke([(0, -1.5, -1.5), (0, -6.5, -4.6)], [3.3, 3.4]), 2.2)  # neck
     c.add(ball((0, 2.1, 1.3), (2.7, 1.9, 1.9)), 1.2)  # forehead
     c.add(stroke([(0, 1.7, 2.4), (0, 0.45, 3.5), (0, -0.7, 4.45)], [1.0, 0.82, 0.55], (1.0, 1, 1)), 0.9)  # nose bridge
-    c.add(ball((0, -1.6, 3.0), (1.9, 1.35, 1.5)), 0.9)  # muzzle
+    c.add(ball((0, -1.55, 2.9), (1.9, 1.35, 1.5)), 0.9)  # muzzle
     c.add(ball((0.82, -1.65, 3.95), (1.0, 0.84, 1.05), rotation((0, 0, 1), -12)), 0.45, pair=True)  # whisker pads
-    c.add(ball((0, -2.75, 3.55), (0.85, 0.62, 0.85)), 0.6)  # chin
-    c.add(stroke([(0, -2.7, 3.2), (0, -2.9, 1.2)], [0.75, 1.6]), 1.0)  # lower jaw
+    c.add(ball((0, -2.72, 3.3), (0.85, 0.62, 0.85)), 0.6)  # chin
+    c.add(stroke([(0, -2.7, 3.0), (0, -2.9, 1.2)], [0.75, 1.6]), 1.0)  # lower jaw
     c.add(ball(EYE.centre, EYE.radius * 1.1), 0.45, pair=True)  # lids
     c.add(stroke([(0.75, 1.75, 3.0), (1.7, 2.0, 2.7), (2.9, 1.5, 1.7)], [0.35, 0.42, 0.3]), 0.7, pair=True)  # brow
     c.add(ball((0, -0.82, 4.62), (0.62, 0.36, 0.42)), 0.25)  # nose leather
     c.carve(stroke([(0, -1.15, 5.15), (0, -1.6, 5.05), (0, -2.05, 5.1)], 0.1), 0.3)  # philtrum
-    c.carve(stroke(curve(MOUTH_LINE, 8), [0.05] * 8), 0.22, pair=True)  # the groove of the mouth
+    c.carve(stroke(curve(MOUTH_LINE, 12), [0.05] * 12), 0.22, pair=True)  # the groove of the mouth
     c.carve(ball((0.34, -0.95, 5.05), (0.2, 0.13, 0.3), rotation((0, 0, 1), 25)), 0.12, pair=True)  # nostrils
     return c
 

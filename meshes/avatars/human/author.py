@@ -95,7 +95,7 @@ def skin_part(skin: Skin) -> Part:
     names = []
     quads = best_fans(skin.places, skin.quads)
     for q in quads:
-        found = (name for name, rows in (("nostril", nostril), ("mouth", inside), ("lips", lip)) if rows[q].all())
+        found = (name for name, rows in (("nostril", nostril), ("cheeks", inside), ("lips", lip)) if rows[q].all())
         names.append(next(found, "skin"))
     part.add(skin.places, [tuple(q) for q in quads.tolist()], names)
     return part

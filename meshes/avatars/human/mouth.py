@@ -26,7 +26,11 @@ LOWER_BORDER = np.array([(-5.3, .3), (-5.3, .4), (-5.0, .5), (-4.4, .6), (-3.6, 
 LOWER_BELLY = np.array([(-2.5, 2.2), (-2.5, 2.2), (-2.4, 2.1), (-2.2, 1.9), (-2.0, 1.7), (-1.5, 1.3), (-1.0, .9),
                         (-.5, .5), (0, .2)])
 INNER_DEPTH = np.array([4.2, 4.2, 4.1, 3.9, 3.6, 3.2, 2.7, 2.2, 1.6])
-POCKET = np.array([(11, 5.6), (11, 5.6), (10.6, 5.8), (10, 6.0), (9, 6.2), (7.6, 6.2), (5.6, 6.0), (3, 5.4), (0, 5.0)])
+UPPER_POCKET = np.array([(11, 5.0), (11, 5.0), (10.6, 5.0), (10, 5.0), (9, 5.0), (7.6, 5.0), (5.6, 5.0), (3, 5.0), (0, 5.0)])
+
+# farther back and less deep: the fold below the lip comes near
+LOWER_POCKET = np.array([(7.5, 6.8), (7.5, 6.8), (7.3, 6.8), (7.0, 6.8), (6.4, 6.8), (5.6, 6.6), (4.4, 6.2), (2.5, 5.5),
+                         (0, 5.0)])
 
 
 def spokes() -> list[tuple[tuple[int, int], int, int, int]]:
@@ -70,7 +74,7 @@ def _section(hole: NDArray, side: int, q: int, lip: int, project) -> list[NDArra
     belly = beside(.5 * corner, dy, dz)
     front = beside(0, up * open_ * SLIT / 2, 0)
     back = beside(-.042 * seam[0], up * open_ * SLIT / 2, -INNER_DEPTH[q])
-    rise, depth = POCKET[q]
+    rise, depth = (UPPER_POCKET if up > 0 else LOWER_POCKET)[q]
     pocket = beside(1.5 * (q / 8) ** 2, up * open_ * rise, -depth - 1.2 * (q / 8))
     border, belly, front, back, pocket = (p * flip for p in (border, belly, front, back, pocket))
     between = 0.66 * hole + 0.34 * border

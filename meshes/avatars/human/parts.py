@@ -56,10 +56,11 @@ def tube(sections: NDArray, *, caps: tuple[bool, bool]) -> tuple[NDArray, list]:
 # ---- teeth ----
 
 TEETH = (8.4, 6.8, 7.4, 6.8, 6.8, 9.0)          # widths from the middle to the first molar
-ARCH_WIDTH, ARCH_DEPTH, ARCH_BACK = 26.0, 36.0, -16.0
+ARCH_WIDTH, ARCH_DEPTH, ARCH_BACK = 29.5, 37.5, -16.0
+ARCH_POWER = 2.6     # of the superellipse: fuller than an ellipse, so that the side teeth stand close behind the lips
 # outward, up; the first and last rows lie in the gum
 UPPER = [(.4, -53.6), (1.0, -57), (.8, -61), (1.1, -65.5), (.3, -71), (-1.2, -70.8), (-3.6, -65), (-4.6, -59), (-3.2, -53.6)]
-LOWER = [(-3.0, -83), (-4.2, -79), (-3.2, -75), (-1.4, -69.6), (-.2, -69.4), (.6, -73.5), (.3, -78), (.9, -81), (.6, -83.5)]
+LOWER = [(-3.4, -82.2), (-4.2, -79), (-3.2, -75), (-1.4, -69.6), (-.2, -69.4), (.6, -73.5), (.3, -77.5), (-1.0, -80), (-2.4, -82.2)]
 GUM_ROWS = {"teeth_upper": (0, 1, 7, 8), "teeth_lower": (0, 1, 7, 8)}
 
 
@@ -67,21 +68,24 @@ def teeth(name: str) -> Part:
     """Return one row of twelve teeth with its gum."""
     upper = name == "teeth_upper"
     profile = np.array(UPPER if upper else LOWER, dtype=np.float64)
-    back = 0.0 if upper else 2.4                         # the lower teeth bite behind the upper ones
+    back = 0.0 if upper else 2.1                         # the lower teeth bite behind the upper ones
     width = np.array(TEETH) * (1.0 if upper else 0.94)
     borders = np.concatenate([[0], np.cumsum(width)])
     places = [(b, 1.0) for b in borders]
     places += [(borders[i] + f * width[i], 0.0) for i in range(len(width)) for f in (.22, .78)]
     places = sorted({(s * x, w) for x, w in places for s in (-1, 1)})
     angle = np.linspace(-np.pi / 2, np.pi / 2, 3000)
-    arch = np.column_stack([(ARCH_WIDTH - back) * np.sin(angle), ARCH_BACK - back + ARCH_DEPTH * np.cos(angle)])
+    sine, cosine = np.sin(angle), np.cos(angle)
+    fuller = 2 / ARCH_POWER
+    arch = np.column_stack([(ARCH_WIDTH - back) * np.sign(sine) * np.abs(sine) ** fuller,
+                            ARCH_BACK - back + ARCH_DEPTH * cosine**fuller])
     length = np.concatenate([[0], np.cumsum(np.linalg.norm(np.diff(arch, axis=0), axis=1))])
     length -= length[-1] / 2
     sections = []
     for along, border in places:
         x, z = (np.interp(along, length, arch[:, k]) for k in (0, 1))
-        a = np.interp(along, length, angle)
-        outward = np.array([np.sin(a) / ARCH_WIDTH, 0, np.cos(a) / ARCH_DEPTH])
+        si, co = np.sin(a := np.interp(along, length, angle)), np.cos(a)
+        outward = np.array([np.sign(si) * abs(si) ** (2 - fuller) / ARCH_WIDTH, 0, co ** (2 - fuller) / ARCH_DEPTH])
         outward /= np.linalg.norm(outward)
         o, y = profile.T.copy()
         edge, line = ((4, 5), (2, 6)) if upper else ((3, 4), (2, 6))
@@ -123,9 +127,9 @@ def tongue() -> Part:
     return part
 
 
-LINING = [  # z, bend back toward the corners, half width, up, down
-    (22.6, 14.5, 29.5, 13.6, 13.2), (22.2, 14, 31.0, 18.8, 15), (12, 6, 32.5, 20.5, 16.5), (-9, 2, 33, 20.5, 17),
-    (-30, 0, 29, 18, 16), (-46, 0, 19, 13, 12), (-52, 0, 9, 6, 6)]
+LINING = [  # z, bend back toward the corners, half width, up, down, and how far its floor lies back and in
+    (24.0, 15.0, 29.5, 13.6, 7.0, 2.0), (23.6, 14.5, 31.0, 18.8, 13.4, 4.4), (12, 6, 32.5, 20.5, 16.0, 2.0),
+    (-9, 2, 33, 20.5, 17, 0), (-30, 0, 29, 18, 16, 0), (-46, 0, 19, 13, 12, 0), (-52, 0, 9, 6, 6, 0)]
 MOUTH_MIDDLE = -70.0
 
 
@@ -135,11 +139,13 @@ def lining() -> Part:
     around = 2 * np.pi * np.arange(n) / n
     c, s = (np.sign(t) * np.abs(t) ** 0.55 for t in (np.cos(around), np.sin(around)))
     sections = []
-    for z, bend, w, up, down in LINING:
-        sections.append(np.column_stack([w * c, MOUTH_MIDDLE + np.where(s > 0, up, down) * s, z - bend * c**2]))
+    for z, bend, w, up, down, back in LINING:
+        floor = np.maximum(-s, 0.0)                      # clear of the fold below the lip, and of the folds beside it
+        sections.append(np.column_stack([(w - 0.5 * back * floor) * c, MOUTH_MIDDLE + np.where(s > 0, up, down) * s,
+                                         z - bend * np.abs(c) ** 2.5 - back * floor]))
     vertices, faces = tube(np.array(sections), caps=(False, True))
     part = Part("mouth")
-    part.add(vertices, [f[::-1] for f in faces], "mouth")
+    part.add(vertices, [f[::-1] for f in faces], ["cheeks" if max(f) < 3 * n else "mouth" for f in faces])
     return part
 
 
@@ -148,8 +154,13 @@ def lining() -> Part:
 BROWS = {  # the middle of the hair, from inside outward: x, y seen from the front
     1: [(8.5, 13.4), (15, 15.8), (24, 18.2), (33, 19.4), (42, 17.4), (50, 11.6)],
     -1: [(-8.0, 12.6), (-15, 14.2), (-24, 15.4), (-33, 15.6), (-42, 12.8), (-50, 6.6)]}
-BROW_HALF = (2.0, 3.4, 3.8, 3.5, 2.6, 0.9)
-TUFTS = 44
+BROW_HALF = (2.4, 4.0, 4.4, 4.1, 3.1, 1.3)
+BROW_BULK = 2.6                  # height of the hair over the skin
+TUFTS = 11                       # a brow
+TUFT = (                         # columns of a tuft: how high they lie, how far they reach beyond the upper and the lower edge
+    (.42, .02, .0, "brows_grey"), (.85, .14, .06, "brows_white"), (1.0, .36, .16, "brows_white"),
+    (.72, .18, .08, "brows_white"))
+ACROSS = np.array([-1, -.72, -.36, 0, .36, .72, 1])
 
 
 def brows(skin: NDArray, normals: NDArray, rng) -> Part:
@@ -161,7 +172,7 @@ def brows(skin: NDArray, normals: NDArray, rng) -> Part:
 
 
 def _add_brow(part: Part, sign: int, skin: NDArray, normals: NDArray, rng) -> None:
-    """Add one brow: a thin mat on the skin with tufts of hair growing out of it."""
+    """Add one brow: a thick mat that is combed into broad tufts, which overlap and end raggedly."""
     front = np.flatnonzero((normals[:, 2] > 0.1) & (skin[:, 2] > -20))
     tree = cKDTree(skin[front, :2])
     points = np.array(BROWS[sign], dtype=np.float64)
@@ -176,53 +187,29 @@ def _add_brow(part: Part, sign: int, skin: NDArray, normals: NDArray, rng) -> No
         n = (w[..., None] * normals[front][i]).sum(axis=-2)
         return np.concatenate([xy, z[..., None]], axis=-1), n / np.linalg.norm(n, axis=-1, keepdims=True)
 
-    along, across = np.linspace(0, t[-1], 17), np.linspace(-1, 1, 5)
-    tangent = line(along, 1)
-    tangent /= np.linalg.norm(tangent, axis=1, keepdims=True)
-    upward = np.column_stack([-tangent[:, 1], tangent[:, 0]]) * sign
-    ragged = 1 + .12 * rng.standard_normal((17, 1))
-    xy = line(along)[:, None] + (half(along)[:, None] * across * ragged)[..., None] * upward[:, None]
-    place, normal = lift(xy)
-    end = np.sin(np.pi * np.linspace(0.04, 0.97, 17)) ** .4
-    height = 0.25 + 0.9 * (1 - across**2)[None, :] * end[:, None]
-    mat = place + height[..., None] * normal
-    faces = []
-    for a in range(16):
-        for b in range(4):
-            q = (a * 5 + b, (a + 1) * 5 + b, (a + 1) * 5 + b + 1, a * 5 + b + 1)
+    count = TUFTS * len(TUFT) + 1
+    height, above, below, names = zip(*(TUFT[k % len(TUFT)] for k in range(count)), strict=True)
+    vigour = np.repeat(rng.uniform(.6, 1.3, TUFTS + 1), len(TUFT))[:count]
+    share = np.linspace(0, 1, count)
+    lean = .16 + .5 * share                              # inner hairs stand up, outer ones lie along the brow
+    lean *= np.minimum(1.0, 4 * (1 - share))
+    s = np.clip(t[-1] * share[:, None] + lean[:, None] * ACROSS, 0, t[-1])
+    reach = np.where(ACROSS > 0, np.outer(vigour * above, ACROSS**2), np.outer(vigour * below, ACROSS**2))
+    tangent = line(s, 1)
+    tangent /= np.linalg.norm(tangent, axis=-1, keepdims=True)
+    upward = np.stack([-tangent[..., 1], tangent[..., 0]], axis=-1) * sign
+    place, normal = lift(line(s) + (half(s) * ACROSS * (1 + reach))[..., None] * upward)
+    end = np.sin(np.pi * np.linspace(0.05, 0.97, count)) ** .4
+    bulk = BROW_BULK * np.outer(end * np.array(height), (1 - ACROSS**2) ** .6)
+    mat = place + (bulk - .3)[..., None] * normal        # its edge is in the skin
+    n = len(ACROSS)
+    faces, materials = [], []
+    for a in range(count - 1):
+        for b in range(n - 1):
+            q = (a * n + b, (a + 1) * n + b, (a + 1) * n + b + 1, a * n + b + 1)
             faces.append(q if sign > 0 else q[::-1])
-    part.add(mat.reshape(-1, 3), faces, "brows_white")
-    for i in range(TUFTS):
-        s = t[-1] * (i + .5) / TUFTS
-        side = ((i * 0.618) % 1.0 - .55) * 1.7
-        tan = line(s, 1) / np.linalg.norm(line(s, 1))
-        up = np.array([-tan[1], tan[0]]) * sign
-        root, n = lift(line(s) + side * half(s) * up)
-        fan = 1 - s / t[-1]                              # inner hairs stand up, outer ones lie along the brow
-        out = np.append(tan, 0) * (.55 + .9 * (1 - fan)) + np.append(up, 0) * (.7 * fan + .05 - .5 * side) + .75 * n
-        out += .18 * rng.standard_normal(3)
-        out /= np.linalg.norm(out)
-        part.add(*_tuft(root + .3 * n, out, n, length=4.8 + 2.6 * rng.random(), width=.8), "brows_white")
-
-
-def _tuft(root, out, normal, *, length: float, width: float) -> tuple[NDArray, list]:
-    """Return a three-sided spike that bends back toward the skin."""
-    side = np.cross(out, normal)
-    side /= np.linalg.norm(side)
-    over = np.cross(side, out)
-    ring = [np.cos(a) * side + .7 * np.sin(a) * over for a in (np.pi / 2, np.pi * 7 / 6, np.pi * 11 / 6)]
-    middle = root + .55 * length * out
-    tip = root + length * out - .16 * length * normal
-    vertices = [root + width * r for r in ring] + [middle + .75 * width * r for r in ring] + [tip]
-    faces = []
-    for i in range(3):
-        j = (i + 1) % 3
-        faces += [(i, j, 3 + j, 3 + i), (3 + i, 3 + j, 6)]
-    v = np.array(vertices)
-    a, b, c = v[0], v[1], v[4]
-    if np.dot(np.cross(b - a, c - a), (a + b) / 2 - root) < 0:
-        faces = [f[::-1] for f in faces]
-    return v, faces
+            materials.append(names[a])
+    part.add(mat.reshape(-1, 3), faces, materials)
 
 
 # ---- the fringe of hair ----

@@ -19,9 +19,10 @@ YAW, ROLL = 6.0, -2.5        # degrees: he looks a little to his left, his head 
 DECIMALS = 4
 COLOURS = {  # sRGB 0..255
     "skin": (214, 164, 140), "lips": (176, 108, 100), "nostril": (134, 82, 68), "mouth": (92, 34, 30),
+    "cheeks": (146, 76, 70),
     "pupil": (16, 12, 11), "iris": (104, 124, 138), "limbus": (64, 78, 88), "sclera": (226, 219, 210),
     "teeth": (226, 208, 174), "gums": (172, 96, 92), "tongue": (182, 98, 94), "brows_white": (196, 190, 183),
-    "hair_white": (205, 200, 194)}
+    "brows_grey": (172, 166, 160), "hair_white": (205, 200, 194)}
 
 
 def to_file(places: NDArray) -> NDArray:

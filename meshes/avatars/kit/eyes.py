@@ -79,11 +79,20 @@ def ellipse(count: int, width: float, height: float) -> NDArray:
 
 
 def lid_rings(
-    eye: Eye, clay: Clay, outline: NDArray, offsets: Sequence[float], *, crest: float, inside: float, pocket: float
+    eye: Eye,
+    clay: Clay,
+    outline: NDArray,
+    offsets: Sequence[float],
+    *,
+    edge: float,
+    crest: float,
+    inside: float,
+    pocket: float,
 ) -> list[NDArray]:
     """Return rings (k, 3) round an opening, the outermost first: on the skin, the margin, then behind the lid.
 
-    offsets: distances of the rings on the skin from the margin, the largest first. crest, inside: heights of the margin
+    offsets: distances of the rings on the skin from the margin, the largest first. edge: how wide at most the lid's edge
+    is, from the margin towards the nearest of them, which may lie high above it in a corner. crest, inside: heights of the margin
     and of the lid's inner side above the ball's middle, in radii. pocket: how far the skin goes behind the lid (1.3 is
     three tenths of the opening).
     """
@@ -101,8 +110,11 @@ def lid_rings(
         for _ in range(int(_EVENING * d / max(offsets))):
             ring = clay.onto(0.5 * ring + 0.25 * (np.roll(ring, 1, axis=0) + np.roll(ring, -1, axis=0)), steps=3)
         skin.append(ring)
+    rise = skin[-1] - margin
+    rise *= np.minimum(1.0, edge / np.linalg.norm(rise, axis=1, keepdims=True))
     return [
         *skin,
+        margin + rise,
         margin,
         eye.on_ball(1.07 * outline, inside),
         eye.on_ball((1 + pocket) / 2 * outline, inside),

@@ -13,52 +13,67 @@ from clay import Clay, curve, mirrored
 from numpy.typing import ArrayLike, NDArray
 from sheet import Sheet
 
+# Lips' rows are found by steps of this length over the skin: short beside the roundness of a lip's edge.
+_STRIDE = 0.03
+_EVENING, _EVENING_ALONG = 2, 12
 
-def lip_rows(
-    slit: NDArray,
-    clay: Clay,
-    offsets: Sequence[float],
-    *,
-    gap: float,
-    out: NDArray | None = None,
-    rim: Sequence[tuple[float, float]] = (),
-    sunk: float = 0.0,
-    inner: Sequence[tuple[float, float]] = (),
-) -> list[NDArray]:
+
+def slit_at(clay: Clay, line: ArrayLike, count: int, within: ArrayLike) -> NDArray:
+    """Return the slit (count, 3), evenly spaced from the middle to the left corner, at the bottom of the mouth's groove.
+
+    line: places in the groove, before the surface. within: where the rays from the line go, inside the head.
+    """
+    places = curve(line, count)
+    inward = np.asarray(within, float) - places
+    inward /= np.linalg.norm(inward, axis=1, keepdims=True)
+    slit = clay.shoot(places + inward, -inward, 1.0)
+    slit[0, 0] = 0.0
+    return slit
+
+
+def lip_rows(slit: NDArray, clay: Clay, offsets: Sequence[float], *, gap: float) -> list[NDArray]:
     """Return rows (2 k + 1, 3) round a slit (k + 1, 3), which runs from the middle to the left corner.
 
-    The first rows lie ``offsets`` away from the slit on the skin, the largest first; then those of the rounded rim, each
-    (away from the slit, behind the skin); then the slit itself, ``sunk`` behind the skin, its lips ``gap`` apart; then
-    those on the inner side. out: ways out of the mouth (k + 1, 3), unit; the skin's normals if not given.
+    The first rows lie ``offsets`` away from the slit, measured over the skin, the largest first; the last is the slit
+    itself, its lips ``gap`` apart.
     """
     k = len(slit) - 1
     along = np.gradient(slit, axis=0)
     along[0] = (1.0, 0.0, 0.0)
+    # Smoothed, or the rows would crowd on the inner side of the slit's bends.
+    for _ in range(_EVENING_ALONG):
+        along[1:-1] = along[1:-1] / 2 + (along[:-2] + along[2:]) / 4
     along /= np.linalg.norm(along, axis=1, keepdims=True)
-    normal = clay.normals(slit) if out is None else np.array(out)
-    normal[0, 0] = 0.0
-    up = np.cross(normal, along)
-    up /= np.linalg.norm(up, axis=1, keepdims=True)
     # Towards the corner the rows fan out round it.
-    fan = 0.9 * (np.arange(k) / k)[:, None] ** 5
-
-    def row(d: float, depth: float = 0.0) -> NDArray:
-        line = slit - depth * normal
-        upper, lower = (line[:k] + d * (sign * np.cos(fan) * up[:k] + np.sin(fan) * along[:k]) for sign in (1, -1))
-        return np.concatenate([upper, line[k:] + d * along[k:], lower[::-1]])
-
+    fan = np.pi / 2 * np.concatenate([share := (np.arange(k + 1) / k) ** 5, 2 - share[-2::-1]])
+    along = np.concatenate([along, along[-2::-1]])
+    walkers = np.concatenate([slit, slit[-2::-1]])
+    rows, walked = [], 0.0
+    for d in sorted(offsets):
+        steps = int(np.ceil((d - walked) / _STRIDE))
+        for _ in range(steps):
+            up = np.cross(clay.normals(walkers), along)
+            up /= np.linalg.norm(up, axis=1, keepdims=True)
+            walkers = walkers + (d - walked) / steps * (np.cos(fan)[:, None] * up + np.sin(fan)[:, None] * along)
+            walkers[[0, -1], 0] = 0.0
+            walkers = clay.onto(walkers, steps=3)
+            walkers[[0, -1], 0] = 0.0
+        rows.append(_even(walkers, clay))
+        walked = d
     taper = np.sqrt(1 - (np.arange(k) / k) ** 2)[:, None]
     half = gap / 2 * np.array([0.0, 1.0, 0.0]) * taper
-    line = slit - sunk * normal
-    rows = [
-        *(clay.onto(row(d)) for d in offsets),
-        *(row(*one) for one in rim),
-        np.concatenate([line[:k] + half, line[k:], (line[:k] - half)[::-1]]),
-        *(row(*one) for one in inner),
-    ]
-    for one in rows:
-        one[[0, -1], 0] = 0.0
-    return rows
+    return [*rows[::-1], np.concatenate([slit[:k] + half, slit[k:], (slit[:k] - half)[::-1]])]
+
+
+def _even(row: NDArray, clay: Clay) -> NDArray:
+    """Return a row smoothed along itself, on the skin."""
+    corner = len(row) // 2
+    for _ in range(_EVENING):
+        even = np.concatenate([row[:1], row[1:-1] / 2 + (row[:-2] + row[2:]) / 4, row[-1:]])
+        even[corner] = row[corner]
+        row = clay.onto(even, steps=3)
+        row[[0, -1], 0] = 0.0
+    return row
 
 
 def arch(*left: tuple[float, float, float]) -> NDArray:
