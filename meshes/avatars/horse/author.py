@@ -59,7 +59,7 @@ DECIMALS = 3
 CANDIDATES = 16000
 
 OPENING = almond(LID, 53, 40, 33, point=0.35, inner_drop=6, lean=0.10)
-LID_RINGS = {"offsets": (0.38, 0.22, 0.11, 0.04), "crest": 1.05, "inside": 1.02, "pocket": 1.4}
+LID_RINGS = {"offsets": (0.38, 0.22, 0.1), "edge": 0.045, "crest": 1.05, "inside": 1.02, "pocket": 1.4}
 # The white of the face, seen square to it: half of its outline, (x, z).
 BLAZE = ((0.0, 2.2), (0.3, 2.6), (0.55, 3.2), (0.5, 3.9), (0.4, 5.0), (0.36, 7.0), (0.42, 8.6), (0.44, 9.5), (0.38, 9.9),
          (0.2, 10.25), (0.0, 10.35))
@@ -153,7 +153,7 @@ def eyes() -> list[Mesh]:
 
 def landmarks(clay: Clay) -> dict[str, NDArray]:
     """Return name -> place (3,) on the left half."""
-    lids = lid_rings(model.EYE, clay, OPENING, **LID_RINGS)[len(LID_RINGS["offsets"])]
+    lids = lid_rings(model.EYE, clay, OPENING, **LID_RINGS)[-4]
     rows = lips(clay)
     edge = rows[EDGE]
     m = LIP
