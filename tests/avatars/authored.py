@@ -8,7 +8,26 @@ from pathlib import Path
 
 import numpy as np
 
+from facegen.face.landmarks import REQUIRED
+from facegen.transfer.landmarks import check_places, load_landmarks
+
 AVATARS = Path(__file__).parents[2] / "meshes" / "avatars"
+
+
+def marked_places(name, mesh, *, also=()):
+    """Return an avatar's landmarks, name -> place (3,); assert that all required ones and these are set, none
+    suspicious."""
+    marks = load_landmarks(AVATARS / name / "landmarks.yaml", mesh, mesh_name=f"{name}.obj")
+    assert set(REQUIRED) | set(also) <= set(marks.names)
+    assert check_places(marks, mesh) == []
+    return marks.points(mesh.vertices)
+
+
+def check_mirrored(points, *, atol):
+    """Assert that the required landmarks of the two sides mirror each other."""
+    for name in REQUIRED:
+        if name.endswith("_L"):
+            np.testing.assert_allclose(points[name] * (-1, 1, 1), points[f"{name[:-1]}R"], atol=atol, err_msg=name)
 
 
 def part(mesh, name):

@@ -42,8 +42,8 @@ def test_the_script_writes_what_ships(tmp_path):
 
 
 def test_it_has_few_polygons_and_separate_parts(mesh):
-    assert 700 <= len(np.unique(part(mesh, "skin"))) <= 1400
-    assert len(mesh.vertices) <= 3500
+    assert 700 <= len(np.unique(part(mesh, "skin"))) <= 1600
+    assert len(mesh.vertices) <= 4000
     assert len(np.unique(mesh.faces)) == len(mesh.vertices), "every vertex is used"
     assert {"eye_L", "eye_R", "teeth_upper", "teeth_lower", "tongue", "cap", "moustache"} < set(mesh.parts)
     colours = {line.split()[1] for line in (HERE / "cartoon.mtl").read_text().splitlines() if line.startswith("newmtl")}
@@ -59,7 +59,7 @@ def test_the_skin_is_one_oriented_manifold_with_two_eyes_and_a_neck(mesh):
     skin = part(mesh, "skin")
     count = edges(skin)
     assert max(count.values()) == 1
-    assert sorted(len(rim) for rim in rims(skin)) == [20, 20, 30]
+    assert sorted(len(rim) for rim in rims(skin)) == [30, 40, 40]
     # Euler: a sphere with three holes, so no handle, no vertex that two sheets share, and one component.
     sides = {tuple(sorted(edge)) for edge in count}
     assert len(np.unique(skin)) - len(sides) + len(skin) == -1

@@ -1,29 +1,20 @@
 """The cat that ships: its files are what its script writes, its lids and its mouth can close and open."""
 
-from collections import Counter
-
 import numpy as np
 import pytest
-from authored import AVATARS, check_script, part
+from authored import AVATARS, check_mirrored, check_script, edges, marked_places, part
 
-from facegen.face.landmarks import REQUIRED
 from facegen.fileio.obj import load_obj
-from facegen.transfer.landmarks import check_places, load_landmarks
-
-HERE = AVATARS / "cat"
 
 
 @pytest.fixture(scope="module")
 def mesh():
-    return load_obj(HERE / "cat.obj")
+    return load_obj(AVATARS / "cat" / "cat.obj")
 
 
 @pytest.fixture(scope="module")
 def points(mesh):
-    marks = load_landmarks(HERE / "landmarks.yaml", mesh, mesh_name="cat.obj")
-    assert set(REQUIRED) <= set(marks.names)
-    assert check_places(marks, mesh) == []
-    return marks.points(mesh.vertices)
+    return marked_places("cat", mesh)
 
 
 def test_the_script_writes_what_ships(tmp_path):
@@ -32,8 +23,7 @@ def test_the_script_writes_what_ships(tmp_path):
 
 def test_no_side_of_the_skin_has_more_than_two_triangles(mesh):
     skin = part(mesh, "skin")
-    count = Counter((int(a), int(b)) for face in skin for a, b in zip(face, np.roll(face, -1), strict=True))
-    assert max(count.values()) == 1, "two triangles run along a side in one direction"
+    assert max(edges(skin).values()) == 1, "two triangles run along a side in one direction"
     corners = mesh.vertices[skin]
     areas = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1) / 2
     assert areas.min() > 0
@@ -51,6 +41,4 @@ def test_the_lid_margin_lies_close_before_the_eyeball(mesh, points, side):
 
 
 def test_the_sides_mirror_each_other(points):
-    for name in REQUIRED:
-        if name.endswith("_L"):
-            np.testing.assert_allclose(points[name] * (-1, 1, 1), points[f"{name[:-1]}R"], atol=1e-3, err_msg=name)
+    check_mirrored(points, atol=1e-3)

@@ -2,13 +2,11 @@
 
 import numpy as np
 import pytest
-from authored import AVATARS, check_script, crossings, edges, part
+from authored import AVATARS, check_mirrored, check_script, crossings, edges, marked_places, part
 from scipy import sparse
 from scipy.sparse.csgraph import connected_components
 
-from facegen.face.landmarks import REQUIRED
 from facegen.fileio.obj import load_obj
-from facegen.transfer.landmarks import check_places, load_landmarks
 
 HERE = AVATARS / "horse"
 
@@ -20,10 +18,7 @@ def mesh():
 
 @pytest.fixture(scope="module")
 def points(mesh):
-    marks = load_landmarks(HERE / "landmarks.yaml", mesh, mesh_name="horse.obj")
-    assert set(REQUIRED) | {"jaw_L", "jaw_R", "nose_base", "eye_center_L", "eye_center_R"} <= set(marks.names)
-    assert check_places(marks, mesh) == []
-    return marks.points(mesh.vertices)
+    return marked_places("horse", mesh, also=("jaw_L", "jaw_R", "nose_base", "eye_center_L", "eye_center_R"))
 
 
 def test_the_script_writes_what_ships(tmp_path):
@@ -90,6 +85,4 @@ def test_the_lips_nearly_touch_and_their_teeth_lie_behind_them(mesh, points):
 
 
 def test_the_sides_mirror_each_other(points):
-    for name in REQUIRED:
-        if name.endswith("_L"):
-            np.testing.assert_allclose(points[name] * (-1, 1, 1), points[f"{name[:-1]}R"], atol=1e-2, err_msg=name)
+    check_mirrored(points, atol=1e-2)

@@ -33,17 +33,18 @@ def test_every_shape_that_was_asked_for_is_in_the_file(rigged):
 
 
 def test_left_shapes_leave_the_right_side_alone(rigged):
-    """At most 3 % of their mean movement, and two micrometres, but for a strip of 12 mm beside the midline."""
+    """At most 3 % of their mean movement, and two micrometres, but for a strip of 12 mm beside the midline, in the
+    template's shape and in the avatar's own: a muzzle is narrower than a person's mouth."""
     skin, shapes = rigged.found.skin, load_avatar(rigged.path).shapes
     rows = cKDTree(rigged.found.frame.apply(load_avatar(rigged.path).mesh.vertices)).query(skin.surface.vertices)[1]
-    x = skin.registered[:, 0]
+    x, clear = skin.registered[:, 0], np.abs(skin.surface.vertices[:, 0]) > 12
     template = skin.template
     whole = {"mouthLeft", *(name for name, jaw in zip(template.names, template.jaw, strict=True) if jaw.any())}
     left = [name for name in rigged.names if name.endswith(("_L", "Left")) and name not in whole]
     assert len(left) > 30
     for name in left:
         length = np.linalg.norm(rigged.found.frame.apply_vectors(shapes[name][rows]), axis=1)
-        assert length[x < -12].mean() <= 0.03 * length[x > 12].mean() + 0.002, name
+        assert (clear * length)[x < -12].mean() <= 0.03 * length[x > 12].mean() + 0.002, name
 
 
 def test_a_rigged_avatar_is_a_face(rigged, face):

@@ -38,8 +38,8 @@ mtllib cartoon.mtl
 MATERIALS = """# facegen: colours of the cartoon character. Source: own work of the facegen authors. Licence: MIT.
 """
 LANDMARKS = """# Landmarks of the cartoon character. Left and right are the subject's. A number is a vertex of cartoon.obj (0-based),
-# a face one of its triangles, quads split from their first corner; a point is snapped to the surface. Lids: the crest
-# of the rim. Brows: on the skin under them.
+# a face one of its triangles, quads split from their first corner; a point is snapped to the surface. Lids: the edge
+# next to the eyeball. Brows: on the skin under them.
 source: own work of the facegen authors, MIT
 mesh: cartoon.obj
 landmarks:
@@ -88,8 +88,8 @@ def landmarks(skin: Skin, parts: list[Piece]) -> dict[str, Place]:
         for name, t in (("inner", 0.06), ("mid", 0.5), ("outer", 0.94)):
             x, y = brow_place(t, side)
             found[f"brow_{name}_{side}"] = _seen_at(skin, sign * x, y)
-        margin = ring(f"eye_{side}", 4)
-        of = (lambda k: k) if side == "L" else (lambda k: (10 - k) % 20)       # the right eye's rings are mirrored
+        margin = ring(f"eye_{side}", 6)
+        of = (lambda k: 2 * k) if side == "L" else (lambda k: (20 - 2 * k) % 40)   # the right eye's rings are mirrored
         for name, k in (("inner", 10), ("outer", 0), ("upper", 5), ("lower", 15), ("upper_inner", 7),
                         ("upper_outer", 3), ("lower_inner", 13), ("lower_outer", 17)):
             found[f"eye_{name}_{side}"] = margin[of(k)]
@@ -109,7 +109,7 @@ def landmarks(skin: Skin, parts: list[Piece]) -> dict[str, Place]:
     found["mouth_inner_top"], found["mouth_inner_bottom"] = ring("mouth", 4)[5], ring("mouth", 4)[15]
     found["chin"] = _seen_at(skin, 0.0, -0.80)
     found["head_top"] = skin.rings["crown"][0]
-    found["head_back"] = onto(np.array([[0.0, 0.15, -0.95]]), head_shape)[0]
+    found["head_back"] = onto(np.array([[0.0, 0.25, -0.95]]), head_shape)[0]
     found["neck"] = onto(np.array([[0.0, -1.12, 0.24]]), head_shape)[0]
     return found
 

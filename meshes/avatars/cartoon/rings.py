@@ -9,6 +9,7 @@ import numpy as np
 from head import EAR, EYE, EYE_RADIUS, MIRROR, MOUTH, MOUTH_HALF, Array, face_shape, front, head_shape, onto
 
 AROUND_EYE, AROUND_MOUTH, AROUND_NOSE, AROUND_EAR = 20, 20, 16, 12        # vertices of a ring
+AROUND_LIDS = 2 * AROUND_EYE               # of the rings at the lids' edge: it closes on itself over the whole eyeball
 
 
 def turns(count: int) -> tuple[Array, Array]:
@@ -32,12 +33,12 @@ def _eye_axes() -> Array:
     return np.stack([out, np.cross(forward, out), forward])
 
 
-def lid_ring(outside: float, radius: float) -> Array:
+def lid_ring(outside: float, radius: float, count: int = AROUND_EYE) -> Array:
     """Return a ring round the left eye: ``outside`` degrees outside the margin, at a distance from the centre.
 
     Starts at the outer corner and goes over the upper lid to the inner one.
     """
-    c, s = turns(AROUND_EYE)
+    c, s = turns(count)
     side = np.where(c > 0, 50.0, 43.0) + outside * np.where(c > 0, 1.0, 0.8)
     high = np.where(s > 0, 36.0, 38.0) + outside * np.where(s > 0, 1.0, 0.75)
     across, up = side * c, high * s

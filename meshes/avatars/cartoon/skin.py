@@ -13,7 +13,7 @@ import numpy as np
 from head import EYE_RADIUS, LID, LID_GAP, MIRROR, MOUTH_HALF, SLIT, Array, head_shape, onto
 from numpy.typing import NDArray
 from piece import Piece
-from rings import ear_ring, ear_root, lid_ring, mirrored, mouth_ring, nose_ring, on_lids, orbit_ring
+from rings import AROUND_LIDS, ear_ring, ear_root, lid_ring, mirrored, mouth_ring, nose_ring, on_lids, orbit_ring
 from scipy import sparse
 from scipy.sparse.linalg import splu
 
@@ -30,11 +30,16 @@ class Skin(Piece):
     rings: dict[str, list[int]] = field(default_factory=dict)
 
     def band(self, outer: Sequence[int], inner: Sequence[int], material: str) -> None:
-        """Fill between two rings that run counter-clockwise, seen from outside."""
+        """Fill between two rings that run counter-clockwise, seen from outside; the inner may have twice as many."""
         n = len(outer)
         for i in range(n):
             j = (i + 1) % n
-            self.face((outer[i], outer[j], inner[j], inner[i]), material)
+            if len(inner) == n:
+                self.face((outer[i], outer[j], inner[j], inner[i]), material)
+            else:
+                a, b, c = inner[2 * i], inner[2 * i + 1], inner[2 * j]
+                for face in ((outer[i], b, a), (outer[i], outer[j], b), (outer[j], c, b)):
+                    self.face(face, material)
 
     def inwards(self, name: str, rings: Sequence[tuple[str, Array]]) -> list[int]:
         """Fill a hole with rings, from the outside in, a material each; return the innermost."""
@@ -200,9 +205,10 @@ def _eyes(skin: Skin) -> None:
     full = EYE_RADIUS + LID
     near = lid_ring(11.0, full)
     between = 0.42 * orbit_ring() + 0.58 * near
-    rings = [("skin", on_lids(between, between)), ("skin", on_lids(near, near)), ("skin", lid_ring(4.0, full)),
-             ("lid", lid_ring(0.3, EYE_RADIUS + 0.6 * LID)), ("lid", lid_ring(0.0, EYE_RADIUS + LID_GAP)),
-             ("lid", lid_ring(9.0, EYE_RADIUS + LID_GAP))]
+    rings = [("skin", on_lids(between, between)), ("skin", on_lids(near, near))]
+    rings += [(material, lid_ring(outside, radius, AROUND_LIDS)) for material, outside, radius in (
+        ("skin", 6.0, full), ("skin", 2.5, full), ("lid", 0.3, EYE_RADIUS + 0.4 * LID),
+        ("lid", 0.0, EYE_RADIUS + LID_GAP), ("lid", 8.0, EYE_RADIUS + LID_GAP))]
     skin.inwards("eye_L", rings)
     skin.inwards("eye_R", [(material, mirrored(ring)) for material, ring in rings])
 

@@ -22,10 +22,10 @@ import model  # noqa: E402
 from chart import Round  # noqa: E402
 from clay import Clay, curve  # noqa: E402
 from cover import in_polygon  # noqa: E402
-from eyes import almond, ellipse, eyeball, lid_rings  # noqa: E402
-from mouth import arch, gum_and_teeth, slit_at, tongue, walked_lip_rows  # noqa: E402
+from eyes import almond, ellipse, eye_places, eyeball, lid_rings  # noqa: E402
+from mouth import arch, gum_and_teeth, lip_rows, slit_at, tongue  # noqa: E402
 from numpy.typing import NDArray  # noqa: E402
-from plan import Plan  # noqa: E402
+from plan import Plan, neck_loop  # noqa: E402
 from saving import both_sides, save_avatar  # noqa: E402
 from scipy.spatial import cKDTree  # noqa: E402
 from sheet import Sheet, mirror_image  # noqa: E402
@@ -55,6 +55,7 @@ COLOURS = {
     "whiskers": (248, 246, 240),
 }
 LID = 28  # vertices round an eye
+NECK = 15  # vertices along half of the neck's edge
 LIP = 14  # quads along half a lip
 GAP = 0.012  # between the lips
 DECIMALS = 4
@@ -148,22 +149,17 @@ def nostril_loop(clay: Clay, size: float) -> NDArray:
     )
 
 
-def neck_loop(clay: Clay) -> NDArray:
-    """Return the neck's edge: half of it, from the throat to the nape."""
-    at, normal = model.NECK_PLANE
-    back = np.cross([1.0, 0, 0], normal / np.linalg.norm(normal))
-    turn = np.linspace(0, np.pi, 15)
-    row = clay.shoot(at, np.sin(turn)[:, None] * np.array([1.0, 0, 0]) - np.cos(turn)[:, None] * back, 6.0)
-    row[[0, -1], 0] = 0.0
-    return row
-
-
 def head(clay: Clay) -> Sheet:
     """Return the skin of the left half."""
     lids = lid_rings(model.EYE, clay, OPENING, **LID_RINGS)
     lips = mouth_rows(clay)
-    nostril = nostril_loop(clay, 1.0)
-    loops = {"eye": lids[0], "mouth": lips[0], "ear": model.EAR.loop(clay), "nostril": nostril, "neck": neck_loop(clay)}
+    loops = {
+        "eye": lids[0],
+        "mouth": lips[0],
+        "ear": model.EAR.loop(clay),
+        "nostril": nostril_loop(clay, 1.0),
+        "neck": neck_loop(clay, *model.NECK_PLANE, NECK),
+    }
     plan = Plan(clay, Round(model.CENTRE), REACH, spacing, loops)
     plan.add_middle(-85, 230)
     for _, least, outline in PATCHES:
@@ -210,7 +206,7 @@ def add_lids(sheet: Sheet, loop: NDArray, rings: list[NDArray]) -> None:
 
 def mouth_rows(clay: Clay) -> list[NDArray]:
     """Return the rows of the left half of the lips, the outermost first."""
-    return walked_lip_rows(slit_at(clay, model.MOUTH_LINE, LIP + 1, model.MOUTH_INSIDE), clay, LIP_OFFSETS, gap=GAP)
+    return lip_rows(slit_at(clay, model.MOUTH_LINE, LIP + 1, model.MOUTH_INSIDE), clay, LIP_OFFSETS, gap=GAP)
 
 
 def add_mouth(sheet: Sheet, loop: NDArray, rows: list[NDArray]) -> None:
@@ -322,20 +318,12 @@ def landmarks(clay: Clay, mesh: Mesh) -> dict[str, int]:
     lips = mouth_rows(clay)
     front = lambda x, y: clay.shoot(np.array([x, y, 0.0]), np.array([[0.0, 0.0, 1.0]]), 8.0)[0]  # noqa: E731
     side = lambda y, z: clay.shoot(np.array([0.0, y, z]), np.array([[1.0, 0.0, 0.0]]), 8.0)[0]  # noqa: E731
-    q, m = LID // 4, LIP
+    m = LIP
     places = {
         "brow_inner_L": front(0.85, 1.95),
         "brow_mid_L": front(1.85, 2.35),
         "brow_outer_L": front(3.0, 1.85),
-        "eye_inner_L": lids[2 * q],
-        "eye_outer_L": lids[0],
-        "eye_upper_L": lids[q],
-        "eye_lower_L": lids[3 * q],
-        "eye_upper_outer_L": lids[q // 2],
-        "eye_upper_inner_L": lids[q + q // 2 + 1],
-        "eye_lower_inner_L": lids[2 * q + q // 2],
-        "eye_lower_outer_L": lids[3 * q + q // 2 + 1],
-        "eye_center_L": model.BALL.on_ball(np.zeros((1, 2)))[0],
+        **eye_places(lids, model.BALL),
         "nose_tip": front(0.0, -0.72),
         "nose_bridge": front(0.0, 0.6),
         "nose_wing_L": front(0.62, -0.85),

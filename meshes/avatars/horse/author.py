@@ -19,11 +19,11 @@ sys.path.insert(0, str(HERE.parent / "kit"))
 
 import model  # noqa: E402
 from clay import Clay, curve, rotation  # noqa: E402
-from eyes import almond, ellipse, eyeball, lid_rings  # noqa: E402
+from eyes import almond, ellipse, eye_places, eyeball, lid_rings  # noqa: E402
 from hair import forelock, mane  # noqa: E402
 from muzzle import EDGE, LIP, add_mouth, add_nostril, inner_parts, lips, nostril_loop  # noqa: E402
 from numpy.typing import NDArray  # noqa: E402
-from plan import Plan  # noqa: E402
+from plan import Plan, neck_loop  # noqa: E402
 from saving import both_sides, save_avatar  # noqa: E402
 from sheet import Sheet  # noqa: E402
 
@@ -54,11 +54,12 @@ COLOURS = {
     "mane_dark": (212, 180, 124),
 }
 LID = 28  # vertices round an eye
+NECK = 17  # vertices along half of the neck's edge
 DECIMALS = 3
 CANDIDATES = 16000
 
 OPENING = almond(LID, 53, 40, 33, point=0.35, inner_drop=6, lean=0.10)
-LID_RINGS = {"offsets": (0.38, 0.22, 0.11, 0.04), "crest": 1.05, "inside": 1.02, "pocket": 1.4}
+LID_RINGS = {"offsets": (0.38, 0.22, 0.1), "edge": 0.045, "crest": 1.05, "inside": 1.02, "pocket": 1.4}
 # The white of the face, seen square to it: half of its outline, (x, z).
 BLAZE = ((0.0, 2.2), (0.3, 2.6), (0.55, 3.2), (0.5, 3.9), (0.4, 5.0), (0.36, 7.0), (0.42, 8.6), (0.44, 9.5), (0.38, 9.9),
          (0.2, 10.25), (0.0, 10.35))
@@ -76,16 +77,6 @@ def spacing(points: NDArray) -> NDArray:
     coarse = np.clip(0.19 + 0.17 * np.maximum(away.min(axis=1), 0), 0.19, 0.72)
     x, y, z = points.T
     return np.where((x < 0.9) & (y > 0) & (z > 2) & (z < 9.9), np.minimum(coarse, 0.38), coarse)
-
-
-def neck_loop(clay: Clay) -> NDArray:
-    """Return the neck's edge: half of it, from the throat to the nape."""
-    at, normal = model.NECK_PLANE
-    back = np.cross([1.0, 0, 0], normal / np.linalg.norm(normal))
-    turn = np.linspace(0, np.pi, 17)
-    row = clay.shoot(at, np.sin(turn)[:, None] * np.array([1.0, 0, 0]) - np.cos(turn)[:, None] * back, 6.0)
-    row[[0, -1], 0] = 0.0
-    return row
 
 
 def on_top(clay: Clay, flat: NDArray) -> NDArray:
@@ -127,7 +118,7 @@ def head(clay: Clay) -> Sheet:
     lids = lid_rings(model.EYE, clay, OPENING, **LID_RINGS)
     mouth = lips(clay)
     loops = {"eye": lids[0], "mouth": mouth[0], "ear": model.EAR.loop(clay), "nostril": nostril_loop(clay),
-             "neck": neck_loop(clay)}
+             "neck": neck_loop(clay, *model.NECK_PLANE, NECK)}
     plan = Plan(clay, model.CHART, model.REACH, spacing, loops)
     plan.add_points(on_top(clay, np.array([BLAZE[-1]])))
     plan.add_middle(-90, 270)
@@ -162,24 +153,16 @@ def eyes() -> list[Mesh]:
 
 def landmarks(clay: Clay) -> dict[str, NDArray]:
     """Return name -> place (3,) on the left half."""
-    lids = lid_rings(model.EYE, clay, OPENING, **LID_RINGS)[len(LID_RINGS["offsets"])]
+    lids = lid_rings(model.EYE, clay, OPENING, **LID_RINGS)[-4]
     rows = lips(clay)
     edge = rows[EDGE]
-    q, m = LID // 4, LIP
+    m = LIP
     on = lambda *place: clay.onto(np.array([place]))[0]  # noqa: E731
     return {
         "brow_inner_L": on(1.12, 1.45, 4.55),
         "brow_mid_L": on(1.5, 1.6, 3.7),
         "brow_outer_L": on(1.75, 1.4, 2.8),
-        "eye_inner_L": lids[2 * q],
-        "eye_outer_L": lids[0],
-        "eye_upper_L": lids[q],
-        "eye_lower_L": lids[3 * q],
-        "eye_upper_outer_L": lids[q // 2],
-        "eye_upper_inner_L": lids[q + q // 2 + 1],
-        "eye_lower_inner_L": lids[2 * q + q // 2],
-        "eye_lower_outer_L": lids[3 * q + q // 2 + 1],
-        "eye_center_L": model.BALL.on_ball(np.zeros((1, 2)))[0],
+        **eye_places(lids, model.BALL),
         "nose_tip": on(0.0, 0.5, 11.0),
         "nose_bridge": on(0.0, 1.7, 5.2),
         "nose_wing_L": on(1.4, -0.1, 10.3),

@@ -67,10 +67,10 @@ def clay() -> Clay:
     c.add(ball((1.0, -1.75, 2.4), (1.0, 2.1, 2.2)), 0.6, pair=True)  # cheeks
     c.add(stroke([(0.75, -2.3, 3.2), (0.45, -1.5, 9.0)], [0.9, 0.52]), 0.9, pair=True)  # lower jaw
     c.add(stroke([(1.62, -0.5, 5.2), (1.4, -0.3, 7.0)], [0.2, 0.1]), 0.7, pair=True)  # ridge of the cheekbone
-    c.add(ball((0, -0.45, 10.05), (1.24, 1.05, 1.1)), 0.7)  # muzzle
+    c.add(ball((0, -0.45, 10.0), (1.27, 1.05, 1.14)), 0.7)  # muzzle
     c.add(ball((0, -0.75, 10.45), (1.05, 0.6, 0.8)), 0.4)  # upper lip
-    c.add(ball((0, -1.55, 10.1), (0.95, 0.5, 0.85)), 0.4)  # lower lip
-    c.add(ball((0, -1.95, 9.6), (0.62, 0.45, 0.62)), 0.5)  # chin
+    c.add(ball((0, -1.55, 10.05), (1.0, 0.5, 0.9)), 0.4)  # lower lip
+    c.add(ball((0, -1.95, 9.6), (0.64, 0.45, 0.62)), 0.5)  # chin
     c.add(stroke([(1.45, 0.3, 4.3), (1.2, 0.1, 6.2)], [0.3, 0.2]), 0.5, pair=True)  # before the eye
     c.add(ball(EYE.centre, EYE.radius * 1.08), 0.35, pair=True)  # lids
     c.add(stroke([(1.15, 1.25, 4.4), (1.62, 1.45, 3.5), (1.75, 1.05, 2.6)], [0.22, 0.3, 0.2]), 0.6, pair=True)  # brow

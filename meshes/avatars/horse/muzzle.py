@@ -7,7 +7,7 @@ from itertools import pairwise
 import model
 import numpy as np
 from clay import Clay, curve
-from mouth import arch, gum_and_teeth, lip_rows, tongue
+from mouth import arch, gum_and_teeth, seam, tongue, ways_along
 from numpy.typing import NDArray
 from sheet import Sheet
 
@@ -23,19 +23,35 @@ RIM = ((0.045, 0.035),)
 SUNK = 0.1
 INNER = ((0.02, 0.19), (0.06, 0.28), (0.13, 0.36), (0.24, 0.42), (0.4, 0.46))
 # The mouth behind the lips narrows to the throat: (z, height of its middle, half widths above and below, half height).
-LINING = ((7.3, -1.18, 0.88, 0.64, 0.56), (6.0, -1.22, 0.88, 0.66, 0.58), (4.8, -1.3, 0.75, 0.6, 0.5))
+LINING = ((7.3, -1.18, 0.72, 0.46, 0.54), (6.0, -1.22, 0.8, 0.52, 0.56), (4.8, -1.3, 0.7, 0.5, 0.5))
 THROAT = (0.0, -1.4, 4.3)
 
 
 def lips(clay: Clay) -> list[NDArray]:
-    """Return the rows of the lips, from the skin to their inner side; row `EDGE` is where they touch."""
+    """Return the rows (2 LIP + 1, 3) of the lips, from the skin to their inner side; in row `EDGE` they touch.
+
+    Each goes from the middle of the upper lip round the left corner to the middle of the lower one.
+    """
     slit = clay.onto(curve(model.MOUTH_LINE, LIP + 1))
-    slit[0, 0] = 0.0
-    along = np.gradient(slit, axis=0)
-    along[0] = (1.0, 0.0, 0.0)
+    along = ways_along(slit)
     out = np.stack([-along[:, 2], 0 * along[:, 1], along[:, 0]], axis=1)
     out /= np.linalg.norm(out, axis=1, keepdims=True)
-    return lip_rows(slit, clay, OFFSETS, gap=GAP, out=out, rim=RIM, sunk=SUNK, inner=INNER)
+    up = np.cross(out, along)
+    up /= np.linalg.norm(up, axis=1, keepdims=True)
+    # Towards the corner the rows fan out round it.
+    fan = 0.9 * (np.arange(LIP) / LIP)[:, None] ** 5
+
+    def row(away: float, depth: float = 0.0) -> NDArray:
+        line = slit - depth * out
+        upper, lower = (line[:LIP] + away * (sign * np.cos(fan) * up[:LIP] + np.sin(fan) * along[:LIP])
+                        for sign in (1, -1))
+        return np.concatenate([upper, line[LIP:] + away * along[LIP:], lower[::-1]])
+
+    touching = seam(slit - SUNK * out, GAP)
+    rows = [*(clay.onto(row(d)) for d in OFFSETS), *(row(*r) for r in RIM), touching, *(row(*r) for r in INNER)]
+    for one in rows:
+        one[[0, -1], 0] = 0.0
+    return rows
 
 
 EDGE = len(OFFSETS) + len(RIM)
@@ -50,7 +66,9 @@ def add_mouth(sheet: Sheet, loop: NDArray, rows: list[NDArray]) -> None:
         sheet.band(last, row, name, closed=False)
         last = row
     ovals = [_oval(*oval) for oval in LINING]
-    for ring in (0.65 * rows[-1] + 0.35 * ovals[0], 0.3 * rows[-1] + 0.7 * ovals[0], *ovals):
+    # Narrower than both at first: beside the corner the lips' own inner sides are in the way.
+    between = [(share * rows[-1] + (1 - share) * ovals[0]) * (narrow, 1, 1) for share, narrow in ((0.7, 0.8), (0.3, 0.86))]
+    for ring in (*between, *ovals):
         ring = sheet.row(ring)
         sheet.band(last, ring, "mouth", closed=False)
         last = ring
@@ -103,7 +121,7 @@ def _row(path: NDArray, incisors: tuple[float, ...], cheeks: tuple[float, ...], 
 
 def inner_parts() -> list[Mesh]:
     """Return teeth on their gums, and the tongue."""
-    upper = arch((0.62, -0.62, 4.9), (0.66, -0.66, 6.6), (0.6, -0.68, 8.2), (0.52, -0.7, 9.2), (0.62, -0.72, 9.9),
+    upper = arch((0.54, -0.62, 4.9), (0.58, -0.66, 6.6), (0.5, -0.68, 8.2), (0.46, -0.7, 9.2), (0.58, -0.72, 9.9),
                  (0.42, -0.72, 10.35), (0, -0.72, 10.5))
     lower = arch((0.46, -1.66, 4.9), (0.48, -1.64, 6.6), (0.36, -1.58, 8.2), (0.28, -1.5, 9.0), (0.46, -1.58, 9.65),
                  (0.37, -1.6, 10.1), (0, -1.6, 10.25))

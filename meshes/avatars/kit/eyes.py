@@ -87,14 +87,14 @@ def lid_rings(
     crest: float,
     inside: float,
     pocket: float,
-    edge: float | None = None,
+    edge: float,
 ) -> list[NDArray]:
     """Return rings (k, 3) round an opening, the outermost first: on the skin, the margin, then behind the lid.
 
     offsets: distances of the rings on the skin from the margin, the largest first. crest, inside: heights of the margin
     and of the lid's inner side above the ball's middle, in radii. pocket: how far the skin goes behind the lid (1.3 is
-    three tenths of the opening). edge: adds a ring at most so far from the margin, towards the nearest on the skin,
-    which may lie high above it in a corner.
+    three tenths of the opening). edge: how wide at most the lid's edge is, from the margin towards the nearest
+    ring on the skin, which may lie high above it in a corner.
     """
     margin = eye.on_ball(outline, crest)
     ahead, behind = np.roll(margin, -1, axis=0), np.roll(margin, 1, axis=0)
@@ -110,16 +110,32 @@ def lid_rings(
         for _ in range(int(_EVENING * d / max(offsets))):
             ring = clay.onto(0.5 * ring + 0.25 * (np.roll(ring, 1, axis=0) + np.roll(ring, -1, axis=0)), steps=3)
         skin.append(ring)
-    if edge is not None:
-        rise = skin[-1] - margin
-        skin.append(margin + rise * np.minimum(1.0, edge / np.linalg.norm(rise, axis=1, keepdims=True)))
+    rise = skin[-1] - margin
+    rise *= np.minimum(1.0, edge / np.linalg.norm(rise, axis=1, keepdims=True))
     return [
         *skin,
+        margin + rise,
         margin,
         eye.on_ball(1.07 * outline, inside),
         eye.on_ball((1 + pocket) / 2 * outline, inside),
         eye.on_ball(pocket * outline, inside),
     ]
+
+
+def eye_places(margin: NDArray, ball: Eye) -> dict[str, NDArray]:
+    """Return the left eye's landmarks: name -> place (3,). margin: the ring (k, 3) of the lids' margin, k / 4 whole."""
+    q = len(margin) // 4
+    return {
+        "eye_inner_L": margin[2 * q],
+        "eye_outer_L": margin[0],
+        "eye_upper_L": margin[q],
+        "eye_lower_L": margin[3 * q],
+        "eye_upper_outer_L": margin[q // 2],
+        "eye_upper_inner_L": margin[q + q // 2 + 1],
+        "eye_lower_inner_L": margin[2 * q + q // 2],
+        "eye_lower_outer_L": margin[3 * q + q // 2 + 1],
+        "eye_center_L": ball.on_ball(np.zeros((1, 2)))[0],
+    }
 
 
 def eyeball(part: str, eye: Eye, outlines: Sequence[NDArray], materials: Sequence[str], *, mirror: bool) -> Mesh:

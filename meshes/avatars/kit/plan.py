@@ -15,6 +15,18 @@ from numpy.typing import NDArray
 _GAP = 1.7
 # Places nearer than this are one.
 _SAME = 1e-6
+# Farther than the skin is from the middle of any neck.
+_NECK = 6.0
+
+
+def neck_loop(clay: Clay, at: NDArray, normal: NDArray, count: int) -> NDArray:
+    """Return half of the neck's edge (count, 3), from the throat to the nape: where a plane through a place (3,) on
+    x = 0 cuts the clay. normal (3,): the plane's, down the neck."""
+    back = np.cross([1.0, 0, 0], normal / np.linalg.norm(normal))
+    turn = np.linspace(0, np.pi, count)
+    row = clay.shoot(at, np.sin(turn)[:, None] * np.array([1.0, 0, 0]) - np.cos(turn)[:, None] * back, _NECK)
+    row[[0, -1], 0] = 0.0
+    return row
 
 
 class Plan:
