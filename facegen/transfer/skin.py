@@ -119,12 +119,20 @@ class Skin:
         turned = template.hinge.movement(template.surface.vertices, template.jaw)
         return template.motion - template.jaw_share[None, :, None] * turned
 
-    def _landmark_motion(self):
-        """Return the weights (l, n) that place the parts' landmarks, and the matrix that moves them (eq. 16)."""
+    def _landmark_motion(self, *, blended: bool = False):
+        """Return the weights (l, n) that place the parts' landmarks, and the matrix that moves them (eq. 16).
+
+        blended: as the skin round them goes, where parts blend; a muzzle's lip, which is turned against its nose, would
+        else be drawn into a point. Else each by its own part, as in the paper.
+        """
         names = tuple(name for members in MEMBERS.values() for name in members
                       if name in self.places and name in self.template.places)
         part = {name: part for part, members in MEMBERS.items() for name in members}
-        matrices = np.array([self.parts.matrices[part[name]] for name in names])
+        if blended:
+            matrices, _ = spread(self.parts, self.template.landmarks,
+                                 np.array([self.template.landmarks[name] for name in names]))
+        else:
+            matrices = np.array([self.parts.matrices[part[name]] for name in names])
         return (placing(self.places, names, len(self.surface.vertices)),
                 landmark_matrix(self.template.places, names, matrices, len(self.template.surface.vertices)))
 
@@ -133,7 +141,7 @@ class Skin:
         than it can."""
         template, surface, registered = self.template, self.surface, self.registered
         sides, feet = self.sides, self.feet
-        places, matrix = self._landmark_motion()
+        places, matrix = self._landmark_motion(blended=True)
         if len(surface.faces) < _FINE_ENOUGH:
             fine, fine_registered, made_of = refine(surface, registered, partial(self._bend, motion))
             if len(fine.vertices) > len(surface.vertices):
