@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Container, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,23 +14,39 @@ from facegen.geometry.operators import Surface
 from facegen.transfer.alignment import Similarity
 from facegen.transfer.landmarks import Landmarks
 from facegen.transfer.pieces import Piece, face_names, find_pieces
+from facegen.transfer.skin_mesh import SkinMesh, skin_mesh
 from facegen.transfer.weld import weld
 
 
 @dataclass(frozen=True, eq=False)
 class Apart:
     """``vertices`` (u, 3), welded, in the working frame, mm; ``own`` (n,): which of them each of the mesh is; ``faces``
-    (m, 3) over them. ``points``: landmark -> place (3,). ``pieces``; ``rows``: the skin's vertices among all, and
-    ``surface``: the skin over those alone. ``landmarks``: kept for `places`."""
+    (m, 3) over them. ``points``: landmark -> place (3,). ``pieces``, as the file has them; ``skin``, put in order.
+    ``landmarks``: kept for `places`."""
 
     vertices: NDArray[np.float64]
     own: NDArray[np.int64]
     faces: NDArray[np.int64]
     points: Mapping[str, NDArray[np.float64]]
     pieces: tuple[Piece, ...]
-    rows: NDArray[np.int64]
-    surface: Surface
+    skin: SkinMesh
     landmarks: Landmarks
+
+    @property
+    def rows(self) -> NDArray[np.int64]:
+        """The skin's vertices (n,) among all."""
+        return self.skin.rows
+
+    @property
+    def surface(self) -> Surface:
+        """The skin over those alone."""
+        return self.skin.surface
+
+    @property
+    def solid(self) -> tuple[Piece, ...]:
+        """The pieces, of the skin only the triangles that are in order."""
+        return tuple(replace(piece, faces=self.skin.numbers) if piece.kind == "skin" else piece
+                     for piece in self.pieces)
 
     def places(self, names: Container[str]) -> dict[str, tuple[NDArray, NDArray]]:
         """Return those of the landmarks that are in ``names`` as vertices of the skin and weights: their own triangle
@@ -60,8 +76,6 @@ def take_apart(mesh: Mesh, landmarks: Landmarks, frame: Similarity, *,
     vertices, own = weld(turned, mesh.faces)
     faces, points = own[mesh.faces], landmarks.points(turned)
     pieces = find_pieces(vertices, faces, points, names=face_names(mesh), explicit=explicit)
-    triangles = faces[np.concatenate([piece.faces for piece in pieces if piece.kind == "skin"])]
-    flat = (triangles == np.roll(triangles, 1, axis=1)).any(axis=1)         # what welding made lines of
-    rows, local = np.unique(triangles[~flat], return_inverse=True)
-    surface = Surface(vertices[rows], local.reshape(-1, 3).astype(np.int32))
-    return Apart(vertices, own, faces, points, pieces, rows, surface, landmarks)
+    numbers = np.concatenate([piece.faces for piece in pieces if piece.kind == "skin"])
+    skin = skin_mesh(vertices, faces[numbers], numbers, points)
+    return Apart(vertices, own, faces, points, pieces, skin, landmarks)

@@ -17,7 +17,7 @@ from scipy.spatial import cKDTree
 
 from facegen.geometry.operators import Surface
 from facegen.geometry.spline import smooth_curve
-from facegen.transfer.sides import SLITS
+from facegen.transfer.sides import SLITS, painted
 from facegen.transfer.skin import Skin
 
 Array = NDArray[np.float64]
@@ -30,6 +30,8 @@ SAMPLES = 33
 _NARROW = 0.7
 # A way on the wrong side of the slit is so many times as long.
 _WRONG_SIDE = 20.0
+# An edge this many times as long as the line through its landmarks goes round something else: there is no slit.
+_LONGEST = 2.5
 # Millimetres on the template: no way leads farther round the guide than this.
 _BESIDE = 20.0
 # A guide is sampled at so many places.
@@ -80,6 +82,8 @@ class Margins:
 def facing_margins(skin: Skin, slit: Slit) -> tuple[Margins, Margins] | None:
     """Return the edges of a slit of the template and of the avatar's skin, or None where either has none."""
     template = skin.template
+    if slit.side in painted(skin.surface, skin.places, skin.sides):
+        return None
     own = find_margins(template.surface, slit, template.places, skin.correspondence.sides)
     if own is None:
         return None
@@ -90,7 +94,7 @@ def facing_margins(skin: Skin, slit: Slit) -> tuple[Margins, Margins] | None:
 def find_margins(surface: Surface, slit: Slit, places: Places, sides: Array, *, shape: Array | None = None,
                  guide: Array | None = None) -> Margins | None:
     """Return the edges of a slit of the skin, or None where it has none: corners, or an edge's landmarks, are missing,
-    or both edges are one, as on a face with painted lids.
+    both edges are one, as on a face with painted lids, or no way along the skin is near the landmarks.
 
     places: landmark -> vertices (3,) and weights (3,). sides: `side_fields`. guide (2, g, 3): curves for the edges, in
     the coordinates ``shape`` (n, 3); without, smooth curves through the landmarks, in the surface's own.
@@ -104,7 +108,7 @@ def find_margins(surface: Surface, slit: Slit, places: Places, sides: Array, *, 
             return None
         line = _curve(at[stops]) if guide is None else guide[edge]
         path = _way(surface, at, stops, line, up * sign)
-        if path is None:
+        if path is None or _lengths(surface.vertices[path])[-1] > _LONGEST * _lengths(surface.vertices[stops])[-1]:
             return None
         paths.append(path)
         lines.append(_resampled(at[path], _GUIDE))

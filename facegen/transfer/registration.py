@@ -26,6 +26,7 @@ from facegen.geometry.closest import ClosestPoints, Feet
 from facegen.geometry.factor import Factor
 from facegen.geometry.normals import vertex_normals
 from facegen.geometry.operators import Surface, dirichlet, hinge_energy
+from facegen.transfer.sides import torn
 
 
 @dataclass(frozen=True)
@@ -59,10 +60,11 @@ _LIPS = 4
 class Correspondence:
     """The search for partners on the template: normal-aware, no crossing of slits, no partner on the border."""
 
-    def __init__(self, template: Surface, sides: NDArray) -> None:
+    def __init__(self, template: Surface, sides: NDArray, painted: tuple[int, ...] = ()) -> None:
+        """template, sides: with its `side_fields`. painted: slits that the avatar has not, see `torn`."""
         self.template = template
         self._search = ClosestPoints(template)
-        self.sides = sides
+        self.sides, self._painted = sides, painted
         self._face_sides = sides[template.faces].mean(axis=1)
         edges, of_side = template.edges
         border = template.border_edges
@@ -87,6 +89,8 @@ class Correspondence:
         on_border = (on_side & self._border_side[feet.faces]) | \
             ((feet.weights > 1 - 1e-9) & self._border_corner[feet.faces])
         beyond |= feet.found & on_border.any(axis=1) & (feet.distances > _PAST)
+        if self._painted:
+            beyond |= feet.found & torn(sides, self._face_sides[feet.faces], self._painted)
         return Feet(np.where(beyond, -1, feet.faces), feet.weights, feet.points, feet.distances)
 
     def _itself(self, points: NDArray, normals: NDArray, sides: NDArray, feet: Feet) -> Feet:

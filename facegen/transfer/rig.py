@@ -96,7 +96,7 @@ def rig(avatar: str | Path, output: str | Path, *, landmarks: str | Path | None 
     notes = _notes(source, places.points(source.mesh.vertices), found, asked.sets)
     written = save_avatar(source, output, made, notes=notes, normals=normals, quantise=quantise,
                           expressions=expressions)
-    return Rigged(written, tuple(made), tuple(warnings), found,
+    return Rigged(written, tuple(made), (*warnings, *found.warnings), found,
                   replace(source, shapes={**source.shapes, **made}, notes=notes))
 
 

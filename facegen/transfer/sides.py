@@ -28,11 +28,19 @@ SLITS = (
 the lips are not among them: where lips touch, a person who sets points cannot see on which lip a point lands (see
 `settled`)."""
 
+_EDGES = (("mouth_inner_top", "mouth_inner_bottom"), ("eye_upper_L", "eye_lower_L"), ("eye_upper_R", "eye_lower_R"))
+"""For each slit the landmarks in the middle of its two edges."""
+
 _INNER = {"mouth_inner_top": 1.0, "mouth_inner_bottom": -1.0}
 # Because a point on the wrong lip belongs to a vertex about as near on the other: not farther than this, in mm.
 _ASTRAY = 8.0
 # Because the field is near zero in the depth of a mouth too: a lip's edge has a side of more than this.
 _ON_A_LIP = 0.15
+
+# Because rounding gives the middle of a lip no side at all, and a vertex of lips that are one has neighbours with more.
+_BOTH = 0.05
+# A place with less of a side than this may lie on the line itself.
+_ON_THE_LINE = 0.15
 
 # Millimetres along the skin over which a side fades: about the height of a lip, so that a cheek has no side.
 _REACH = 12.0
@@ -58,13 +66,37 @@ def side_fields(surface: Surface, places: Mapping[str, tuple[NDArray, NDArray]])
     return held.solve(_HOLD * (at.T @ wanted))
 
 
+def painted(surface: Surface, places: Mapping[str, tuple[NDArray, NDArray]], sides: NDArray) -> tuple[int, ...]:
+    """Return the slits without an opening: the skin goes on from one side to the other where both edges rest.
+
+    On lips that touch, points for both edges may rest on one vertex too; but round it the skin is of one lip."""
+    result = []
+    for slit, names in enumerate(_EDGES):
+        if all(name in places for name in names):
+            high, low = (vertices[weights > 1e-6] for vertices, weights in (places[name] for name in names))
+            round_it = surface.faces[np.isin(surface.faces, high).any(axis=1)]
+            both = sides[round_it, slit].min(initial=0.0) < -_BOTH < _BOTH < sides[round_it, slit].max(initial=0.0)
+            if set(high.tolist()) == set(low.tolist()) and (both or slit > 0):
+                result.append(slit)
+    return tuple(result)
+
+
+def torn(sides: NDArray, partners: NDArray, slits: tuple[int, ...]) -> NDArray[np.bool_]:
+    """Return which places (p,) lie on the line of a painted slit while their partner is on one side of the template's:
+    the line belongs to both lips and would tear if some of it went with one and some with the other.
+
+    sides (p, slits) of the places and of their partners."""
+    at = list(slits)
+    return ((np.abs(sides[:, at]) < _ON_THE_LINE) & (np.abs(partners[:, at]) > _ON_THE_LINE)).any(axis=1)
+
+
 def settled(surface: Surface, places: Mapping[str, tuple[NDArray, NDArray]], sides: NDArray
             ) -> dict[str, tuple[NDArray, NDArray]]:
     """Return the places with the inner edges of the lips on their own lip: each that lies on the other goes to the
-    nearest vertex of its own. sides: `side_fields` of the same places."""
+    nearest vertex of its own; on a painted mouth they stay. sides: `side_fields` of the same places."""
     result = dict(places)
     for name, sign in _INNER.items():
-        if name not in places:
+        if name not in places or 0 in painted(surface, places, sides):
             continue
         vertices, weights = places[name]
         if sign * (weights @ sides[vertices, 0]) > 0:

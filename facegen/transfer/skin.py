@@ -24,7 +24,7 @@ from facegen.transfer.part_motion import MEMBERS, PartMotion, part_motion, sprea
 from facegen.transfer.refine import BEND, refine
 from facegen.transfer.registration import Correspondence, register
 from facegen.transfer.registration_key import registration_key
-from facegen.transfer.sides import settled, side_fields
+from facegen.transfer.sides import painted, settled, side_fields
 from facegen.transfer.solve import OURS, Transfer, Weights, landmark_matrix
 from facegen.transfer.template import Template, placing
 
@@ -180,8 +180,9 @@ def lay_skin(template: Template, surface: Surface, places: Mapping[str, tuple[ND
     """
     key = None if kept is None else registration_key(template, surface, places)
     registered = None if key is None else kept.find(key, surface.vertices.shape)
-    correspondence = Correspondence(template.surface, side_fields(template.surface, template.places))
     sides = side_fields(surface, places)
+    correspondence = Correspondence(template.surface, side_fields(template.surface, template.places),
+                                    painted(surface, places, sides))
     places = settled(surface, places, sides)
     if registered is None:
         names = [name for name in places if name in template.places]

@@ -23,7 +23,7 @@ from chart import Round  # noqa: E402
 from clay import Clay, curve  # noqa: E402
 from cover import in_polygon  # noqa: E402
 from eyes import almond, ellipse, eyeball, lid_rings  # noqa: E402
-from mouth import arch, gum_and_teeth, lip_rows, slit_at, tongue  # noqa: E402
+from mouth import arch, gum_and_teeth, slit_at, tongue, walked_lip_rows  # noqa: E402
 from numpy.typing import NDArray  # noqa: E402
 from plan import Plan  # noqa: E402
 from saving import both_sides, save_avatar  # noqa: E402
@@ -210,7 +210,7 @@ def add_lids(sheet: Sheet, loop: NDArray, rings: list[NDArray]) -> None:
 
 def mouth_rows(clay: Clay) -> list[NDArray]:
     """Return the rows of the left half of the lips, the outermost first."""
-    return lip_rows(slit_at(clay, model.MOUTH_LINE, LIP + 1, model.MOUTH_INSIDE), clay, LIP_OFFSETS, gap=GAP)
+    return walked_lip_rows(slit_at(clay, model.MOUTH_LINE, LIP + 1, model.MOUTH_INSIDE), clay, LIP_OFFSETS, gap=GAP)
 
 
 def add_mouth(sheet: Sheet, loop: NDArray, rows: list[NDArray]) -> None:

@@ -7,7 +7,7 @@ from itertools import pairwise
 import model
 import numpy as np
 from clay import Clay, curve
-from mouth import arch, gum_and_teeth, tongue
+from mouth import arch, gum_and_teeth, lip_rows, tongue
 from numpy.typing import NDArray
 from sheet import Sheet
 
@@ -28,34 +28,14 @@ THROAT = (0.0, -1.4, 4.3)
 
 
 def lips(clay: Clay) -> list[NDArray]:
-    """Return the rows (2 LIP + 1, 3) of the lips, from the skin to their inner side; in row `EDGE` they touch.
-
-    Each goes from the middle of the upper lip round the left corner to the middle of the lower one.
-    """
+    """Return the rows of the lips, from the skin to their inner side; row `EDGE` is where they touch."""
     slit = clay.onto(curve(model.MOUTH_LINE, LIP + 1))
+    slit[0, 0] = 0.0
     along = np.gradient(slit, axis=0)
     along[0] = (1.0, 0.0, 0.0)
-    along /= np.linalg.norm(along, axis=1, keepdims=True)
     out = np.stack([-along[:, 2], 0 * along[:, 1], along[:, 0]], axis=1)
     out /= np.linalg.norm(out, axis=1, keepdims=True)
-    up = np.cross(out, along)
-    up /= np.linalg.norm(up, axis=1, keepdims=True)
-    # Towards the corner the rows fan out round it.
-    fan = 0.9 * (np.arange(LIP) / LIP)[:, None] ** 5
-
-    def row(away: float, depth: float = 0.0) -> NDArray:
-        line = slit - depth * out
-        upper, lower = (line[:LIP] + away * (sign * np.cos(fan) * up[:LIP] + np.sin(fan) * along[:LIP])
-                        for sign in (1, -1))
-        return np.concatenate([upper, line[LIP:] + away * along[LIP:], lower[::-1]])
-
-    line = slit - SUNK * out
-    half = GAP / 2 * np.array([0.0, 1.0, 0.0]) * np.sqrt(1 - (np.arange(LIP) / LIP) ** 2)[:, None]
-    touching = np.concatenate([line[:LIP] + half, line[LIP:], (line[:LIP] - half)[::-1]])
-    rows = [*(clay.onto(row(d)) for d in OFFSETS), *(row(*r) for r in RIM), touching, *(row(*r) for r in INNER)]
-    for one in rows:
-        one[[0, -1], 0] = 0.0
-    return rows
+    return lip_rows(slit, clay, OFFSETS, gap=GAP, out=out, rim=RIM, sunk=SUNK, inner=INNER)
 
 
 EDGE = len(OFFSETS) + len(RIM)

@@ -84,17 +84,17 @@ def lid_rings(
     outline: NDArray,
     offsets: Sequence[float],
     *,
-    edge: float,
     crest: float,
     inside: float,
     pocket: float,
+    edge: float | None = None,
 ) -> list[NDArray]:
     """Return rings (k, 3) round an opening, the outermost first: on the skin, the margin, then behind the lid.
 
-    offsets: distances of the rings on the skin from the margin, the largest first. edge: how wide at most the lid's edge
-    is, from the margin towards the nearest of them, which may lie high above it in a corner. crest, inside: heights of the margin
+    offsets: distances of the rings on the skin from the margin, the largest first. crest, inside: heights of the margin
     and of the lid's inner side above the ball's middle, in radii. pocket: how far the skin goes behind the lid (1.3 is
-    three tenths of the opening).
+    three tenths of the opening). edge: adds a ring at most so far from the margin, towards the nearest on the skin,
+    which may lie high above it in a corner.
     """
     margin = eye.on_ball(outline, crest)
     ahead, behind = np.roll(margin, -1, axis=0), np.roll(margin, 1, axis=0)
@@ -110,11 +110,11 @@ def lid_rings(
         for _ in range(int(_EVENING * d / max(offsets))):
             ring = clay.onto(0.5 * ring + 0.25 * (np.roll(ring, 1, axis=0) + np.roll(ring, -1, axis=0)), steps=3)
         skin.append(ring)
-    rise = skin[-1] - margin
-    rise *= np.minimum(1.0, edge / np.linalg.norm(rise, axis=1, keepdims=True))
+    if edge is not None:
+        rise = skin[-1] - margin
+        skin.append(margin + rise * np.minimum(1.0, edge / np.linalg.norm(rise, axis=1, keepdims=True)))
     return [
         *skin,
-        margin + rise,
         margin,
         eye.on_ball(1.07 * outline, inside),
         eye.on_ball((1 + pocket) / 2 * outline, inside),

@@ -31,19 +31,57 @@ def slit_at(clay: Clay, line: ArrayLike, count: int, within: ArrayLike) -> NDArr
     return slit
 
 
-def lip_rows(slit: NDArray, clay: Clay, offsets: Sequence[float], *, gap: float) -> list[NDArray]:
-    """Return rows (2 k + 1, 3) round a slit (k + 1, 3), which runs from the middle to the left corner.
+def lip_rows(
+    slit: NDArray,
+    clay: Clay,
+    offsets: Sequence[float],
+    *,
+    gap: float,
+    out: NDArray,
+    rim: Sequence[tuple[float, float]] = (),
+    sunk: float = 0.0,
+    inner: Sequence[tuple[float, float]] = (),
+) -> list[NDArray]:
+    """Return rows (2 k + 1, 3) of thick lips round a slit (k + 1, 3), which runs from the middle to the left corner.
 
-    The first rows lie ``offsets`` away from the slit, measured over the skin, the largest first; the last is the slit
+    The first rows lie ``offsets`` away from the slit, square to ``out``, and are then moved onto the skin, the largest
+    first; then those of the rounded rim, each (away from the slit, behind the skin); then the slit itself, ``sunk``
+    behind the skin, its lips ``gap`` apart; then those on the inner side. out: ways out of the mouth (k + 1, 3), unit.
+    """
+    k = len(slit) - 1
+    along = _along(slit)
+    normal = np.array(out)
+    normal[0, 0] = 0.0
+    up = np.cross(normal, along)
+    up /= np.linalg.norm(up, axis=1, keepdims=True)
+    # Towards the corner the rows fan out round it.
+    fan = 0.9 * (np.arange(k) / k)[:, None] ** 5
+
+    def row(d: float, depth: float = 0.0) -> NDArray:
+        line = slit - depth * normal
+        upper, lower = (line[:k] + d * (sign * np.cos(fan) * up[:k] + np.sin(fan) * along[:k]) for sign in (1, -1))
+        return np.concatenate([upper, line[k:] + d * along[k:], lower[::-1]])
+
+    rows = [
+        *(clay.onto(row(d)) for d in offsets),
+        *(row(*one) for one in rim),
+        _seam(slit - sunk * normal, gap),
+        *(row(*one) for one in inner),
+    ]
+    for one in rows:
+        one[[0, -1], 0] = 0.0
+    return rows
+
+
+def walked_lip_rows(slit: NDArray, clay: Clay, offsets: Sequence[float], *, gap: float) -> list[NDArray]:
+    """Return rows (2 k + 1, 3) of thin lips round a slit (k + 1, 3), which runs from the middle to the left corner.
+
+    The first rows lie ``offsets`` away from the slit, the largest first, measured over the skin: where that bends
+    sharply out of the groove, a row set off straight and moved onto it would fall on another. The last is the slit
     itself, its lips ``gap`` apart.
     """
     k = len(slit) - 1
-    along = np.gradient(slit, axis=0)
-    along[0] = (1.0, 0.0, 0.0)
-    # Smoothed, or the rows would crowd on the inner side of the slit's bends.
-    for _ in range(_EVENING_ALONG):
-        along[1:-1] = along[1:-1] / 2 + (along[:-2] + along[2:]) / 4
-    along /= np.linalg.norm(along, axis=1, keepdims=True)
+    along = _along(slit, _EVENING_ALONG)
     # Towards the corner the rows fan out round it.
     fan = np.pi / 2 * np.concatenate([share := (np.arange(k + 1) / k) ** 5, 2 - share[-2::-1]])
     along = np.concatenate([along, along[-2::-1]])
@@ -60,9 +98,24 @@ def lip_rows(slit: NDArray, clay: Clay, offsets: Sequence[float], *, gap: float)
             walkers[[0, -1], 0] = 0.0
         rows.append(_even(walkers, clay))
         walked = d
+    return [*rows[::-1], _seam(slit, gap)]
+
+
+def _along(slit: NDArray, evening: int = 0) -> NDArray:
+    """Return the ways (k + 1, 3), unit, along a slit, smoothed so often: or rows crowd on the inner side of its bends."""
+    along = np.gradient(slit, axis=0)
+    along[0] = (1.0, 0.0, 0.0)
+    for _ in range(evening):
+        along[1:-1] = along[1:-1] / 2 + (along[:-2] + along[2:]) / 4
+    return along / np.linalg.norm(along, axis=1, keepdims=True)
+
+
+def _seam(slit: NDArray, gap: float) -> NDArray:
+    """Return the row (2 k + 1, 3) where the lips meet along a slit: ``gap`` apart in the middle, one at the corner."""
+    k = len(slit) - 1
     taper = np.sqrt(1 - (np.arange(k) / k) ** 2)[:, None]
     half = gap / 2 * np.array([0.0, 1.0, 0.0]) * taper
-    return [*rows[::-1], np.concatenate([slit[:k] + half, slit[k:], (slit[:k] - half)[::-1]])]
+    return np.concatenate([slit[:k] + half, slit[k:], (slit[:k] - half)[::-1]])
 
 
 def _even(row: NDArray, clay: Clay) -> NDArray:
