@@ -28,10 +28,7 @@ THROAT = (0.0, -1.4, 4.3)
 
 
 def lips(clay: Clay) -> list[NDArray]:
-    """Return the rows (2 LIP + 1, 3) of the lips, from the skin to their inner side; in row `EDGE` they touch.
-
-    Each goes from the middle of the upper lip round the left corner to the middle of the lower one.
-    """
+    """Return the rows (2 LIP + 1, 3) of the lips, from the skin to their inner side; in row `EDGE` they touch."""
     slit = clay.onto(curve(model.MOUTH_LINE, LIP + 1))
     along = ways_along(slit)
     out = np.stack([-along[:, 2], 0 * along[:, 1], along[:, 0]], axis=1)
