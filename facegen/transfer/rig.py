@@ -74,8 +74,9 @@ def rig(avatar: str | Path, output: str | Path, *, landmarks: str | Path | None 
         facegen.load_face("cat.glb").pose("happiness")
     """
     path = _shipped().get(str(avatar), Path(avatar))
-    if path.suffix == "" and not path.exists():
-        raise FileError(f"avatar: expected a file, or one of {', '.join(_shipped())}, got {str(avatar)!r}"
+    if not path.exists():
+        named = f", or one of {', '.join(_shipped())}" if path.suffix == "" else ""
+        raise FileError(f"avatar: expected a file{named}, got {str(avatar)!r}, which does not exist"
                         f"{nearest(str(avatar), _shipped())}")
     marks = Path(landmarks) if landmarks is not None else path.with_name("landmarks.yaml") \
         if str(avatar) in _shipped() else None

@@ -107,6 +107,8 @@ def test_a_template_transferred_to_itself_gives_its_skin(template):
     ({"method": "sumners"}, "did you mean 'sumner'"),
     ({"opening": 0.0}, "opening: expected a factor"),
     ({"pieces": {"hat": "skull"}}, "hat"),
+    ({"avatar": "nope.obj"}, r"avatar: expected a file, got 'nope\.obj', which does not exist"),
+    ({"avatar": "catt"}, r"expected a file, or one of cartoon, cat.* did you mean 'cat'"),
 ])
 def test_what_cannot_be_done_is_said_and_nothing_is_written(tmp_path, arguments, message):
     with pytest.raises(InputError, match=message):
