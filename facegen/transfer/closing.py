@@ -129,7 +129,7 @@ class Closing:
         lift = np.clip(np.linalg.norm(then - self._at_rest, axis=1) / _LIFTED, 0.0, 1.0)
         wanted = np.where(home < _ON_THE_BALL, np.maximum(home, self._over(_unit(then))), 0.0)
         radius = np.linalg.norm(now, axis=1)
-        radius = radius + lift * np.maximum(wanted - radius, 0.0)
+        radius = radius + _beyond(step) * lift * np.maximum(wanted - radius, 0.0)
         changed = (step != 0).any(axis=1) & (then != 0).any(axis=1)
         place = (radius[:, None] * _unit(then)) @ ball.shape + ball.centre
         moved[rows] = np.where(changed[:, None], place - self.rest[rows], moved[rows])

@@ -8,6 +8,7 @@ from facegen.face.face import load_face
 from facegen.fileio.avatar import load_avatar
 from facegen.render import render_passes
 from facegen.transfer.closing import closing
+from facegen.transfer.eyeball import EyeFront, fit_eye
 from facegen.transfer.margins import LIDS, LIPS, facing_margins, find_margins
 from facegen.transfer.rig import avatar_names, rig
 from facegen.transfer.skin import lay_skin
@@ -96,3 +97,19 @@ def test_a_face_without_landmarks_of_a_slit_has_none(template):
     assert find_margins(template.surface, LIPS, places, sides) is None
     places["mouth_inner_top"] = places["mouth_inner_bottom"]            # painted on: one line
     assert find_margins(template.surface, LIPS, places, sides) is None
+
+
+def test_a_step_of_rounding_size_moves_no_lid(rigged):
+    """A lid that lies in the eye, where only its front is seen, is not lifted out of it because a rounding moved it."""
+    skin, parts = rigged.found.skin, {piece.kind: piece for piece in rigged.found.pieces}
+    vertices = skin.surface.vertices
+    eye = rigged.found.frame.apply(load_avatar(rigged.path).mesh.vertices)[np.unique(
+        load_avatar(rigged.path).mesh.faces[parts["eye_L"].faces])]
+    ball = fit_eye([(eye, np.ones(len(eye)))], outward=np.array([0.0, 0.0, 1.0]), width=np.ptp(eye[:, 0]),
+                   opening=eye.mean(axis=0))
+    lid = closing(skin, LIDS[0], EyeFront(ball, eye))
+    moved = np.zeros_like(vertices)
+    moved[lid.field.rows, 1] = -3.0                            # all of it is on its way already
+    before = moved.copy()
+    lid._move(moved, np.full((len(lid.field.rows), 3), 1e-7))
+    assert np.abs(moved - before).max() < 1e-3
