@@ -16,6 +16,7 @@ from scipy.spatial import cKDTree
 from facegen.data import meshes_dir
 from facegen.fileio.avatar import AvatarFile, load_avatar, save_avatar
 from facegen.geometry.mesh import Mesh, merge
+from facegen.transfer.halfway import half_name
 from facegen.transfer.rig import rig
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "fileio"))
@@ -55,7 +56,8 @@ def rigged_cartoon(folder: Path) -> tuple[Path, AvatarFile, dict[str, np.ndarray
     """Return a whole shipped avatar, rigged: its file, the avatar before, and its shapes."""
     made = rig("cartoon", folder / "cartoon.glb", sets=["arkit"], shapes=SHAPES)
     return made.path, load_avatar(meshes_dir() / "avatars/cartoon/cartoon.obj"), \
-        {name: made.found.shapes[name] for name in SHAPES}
+        {name: made.found.shapes[name] for name in SHAPES} \
+        | {half_name(name): moved for name, moved in made.found.halves.items()}
 
 
 def rows_of(avatar: AvatarFile, name: str, points: np.ndarray) -> tuple[np.ndarray, float]:
