@@ -252,10 +252,7 @@ class _Lips:
         for k in np.flatnonzero(_move(motion, np.concatenate([skin, own]), self._height)):
             given = 0.0
             for step in range(_ROUNDS + 1):
-                places = (self._rest[own] + motion[k, own]) @ self._axes.T
-                now, which = ahead(places, ((self._rest[skin] + motion[k, skin]) @ self._axes.T)[local])
-                through = (which >= 0) & (now > -_THROUGH * self._height)
-                missing = np.where(through, np.maximum(least - now - allowed[k], 0.0), 0.0)
+                missing, which = self._missing(motion[k], own, least - allowed[k], skin, local)
                 after[k] = missing.max()
                 before[k] = after[k] if step == 0 else before[k]
                 if after[k] <= _DONE * self._height or step == _ROUNDS:
@@ -268,6 +265,15 @@ class _Lips:
                 np.maximum.at(push, faces[which[hit]].ravel(), np.repeat(missing[hit] - back, 3))
                 motion[k] += spread(push)[:, None] * self._axes[2]
         return Contact(before, after)
+
+    def _missing(self, moved: Array, own: NDArray, least: Array, skin: NDArray, local: NDArray
+                 ) -> tuple[Array, NDArray[np.int64]]:
+        """Return how much farther behind the skin the vertices own (p,) would have to lie (p,), mm, and which of its
+        triangles lies over each (p,). moved (n, 3); least (p,), mm; skin (s,): its vertices, local (t, 3) over them."""
+        places = (self._rest[own] + moved[own]) @ self._axes.T
+        now, which = ahead(places, ((self._rest[skin] + moved[skin]) @ self._axes.T)[local])
+        through = (which >= 0) & (now > -_THROUGH * self._height)
+        return np.where(through, np.maximum(least - now, 0.0), 0.0), which
 
     def lining(self, motion: Array, pieces: PieceMotion) -> Contact:
         """Bring the lining that lay behind the lips at rest behind them in all shapes, in place."""
@@ -285,9 +291,7 @@ class _Lips:
         local = local.reshape(-1, 3)
         for k in np.flatnonzero(_move(motion, np.concatenate([front, own]), self._height)):
             for step in range(_ROUNDS + 1):
-                places = (self._rest[own] + motion[k, own]) @ self._axes.T
-                now, which = ahead(places, ((self._rest[front] + motion[k, front]) @ self._axes.T)[local])
-                missing = np.where((which >= 0) & (now > -_THROUGH * self._height), np.maximum(least - now, 0.0), 0.0)
+                missing, _ = self._missing(motion[k], own, least, front, local)
                 after[k] = missing.max()
                 before[k] = after[k] if step == 0 else before[k]
                 if after[k] <= _DONE * self._height or step == _ROUNDS:
