@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from facegen.animation.clip import Clip
+    from facegen.animation.performance import Performance
     from facegen.animation.script import load_clip, morph
     from facegen.blendshapes.recipes import Recipe, shape_set
     from facegen.errors import FacegenError, FileError, InputError, JobError, NotationError, TableError
@@ -55,6 +56,7 @@ __all__ = [
     "JobError",
     "Mesh",
     "NotationError",
+    "Performance",
     "Recipe",
     "Renderer",
     "Resolution",
@@ -93,6 +95,7 @@ __all__ = [
 # Where each name lives. Read on first use (PEP 562), so that `import facegen` costs nothing.
 _HOMES = {
     "facegen.animation.clip": ("Clip",),
+    "facegen.animation.performance": ("Performance",),
     "facegen.animation.script": ("load_clip", "morph"),
     "facegen.blendshapes.recipes": ("Recipe", "shape_set"),
     "facegen.errors": ("FacegenError", "FileError", "InputError", "JobError", "NotationError", "TableError"),
