@@ -165,5 +165,5 @@ def _through(values: Array, knots: Array, heights: Array) -> Array:
     return heights[at] + (values - knots[at]) * slopes[at]
 
 
-OPENFACE = Format(NAME, "OpenFace 2: AU01_r 0..5, AU01_c, gaze, pose (CSV)", (".csv", ".txt"), knows, read, write,
-                  "units", sides=False)
+OPENFACE = Format(NAME, "OpenFace 2: AU01_r 0..5, AU01_c, gaze, pose (CSV)", (".csv",), knows, read, write, "units",
+                  sides=False)

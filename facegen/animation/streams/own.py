@@ -30,7 +30,7 @@ def knows(sample: Sample) -> bool:
     """Return whether a file has a time, or a name of a shape that is known."""
     if {TIME, "frame"} & sample.columns and len(sample.columns) > 1:
         return True
-    return any(_vocabulary([name]) for name in list(sample.columns)[:2000])
+    return any(_names(sorted(sample.columns), name) for name in SETS)
 
 
 def read(path: Path, wish: Wish) -> Performance:
@@ -78,7 +78,7 @@ def _names(columns: list[str], vocabulary: str) -> dict[str, str]:
         return match(columns, {shape: recipe.also for shape, recipe in shape_set(vocabulary).items()})
     codes, found = set(load_catalogue().codes), {}
     for name in columns:
-        code = member_of(name.strip().replace("au", "AU", 1))
+        code = member_of(name.strip().upper())
         if code in codes and code not in found.values():
             found[name] = code
     return found
