@@ -115,7 +115,7 @@ class _FaceDriver(Driver):
         zero = self.rig.linear_controls(Deformation(), strict=False)
         self._shapes = {one.name: getattr(zero, one.name).shape for one in fields(Controls)}
         parts = self.meaning.parts.values()
-        self._inputs = np.array([self._input(part) for part in parts]).reshape(len(parts), -1)
+        self._inputs = np.array([self._input(part) for part in parts]).reshape(len(parts), self._size)
         rows = self.rig.feature_points
         self._with_jaw = [[list(rows).index(name) for one in part.deformations for name in one.with_jaw if name in rows]
                           for part in parts]

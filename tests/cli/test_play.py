@@ -9,7 +9,7 @@ import pytest
 from PIL import Image
 
 import facegen
-from facegen.animation.gltf_recording import read_gltf_performance
+from facegen.animation.streams.gltf import read_gltf_performance
 
 QUICK = ("--rig", "akimoto-1986", "--size", "32", "--workers", "1", "--detail", "0", "--renderer", "soft")
 
@@ -62,7 +62,7 @@ def test_animate_into_a_glb(run, tmp_path):
 
 
 @pytest.mark.parametrize(("options", "words"), [
-    (["--animation", "tak"], "did you mean 'take'"), (["--rig", "akimoti"], "did you mean 'akimoto'"),
+    (["--id", "tak"], "--id: take.glb has no animation 'tak'"), (["--rig", "akimoti"], "did you mean 'akimoto'"),
     (["--bridge", "-1"], "bridge: expected seconds"), (["--fps", "0"], "fps"), (["-o", "b.avi"], "b.avi"),
     (["-o", "no/b.glb"], "does not exist")])
 def test_bad_options(run, take, tmp_path, monkeypatch, options, words):
@@ -89,3 +89,28 @@ def test_a_file_without_an_animation(run, rig_file, tmp_path):
     code, _, err = run("play", rig_file("arkit"), "-o", tmp_path / "a.gif")
     assert code == 2
     assert "has no animation of morph target weights" in err
+
+
+def test_a_recording_of_a_tracker(run, tmp_path):
+    path = tmp_path / "face.csv"
+    path.write_text("time,AU12_L,AU12_R,AU26,head_yaw,head_pitch,head_roll\n"
+                    + "".join(f"{k / 10},{k / 10},0.1,,{5 * k},0,0\n" for k in range(5)))
+    code, _, err = run("play", path, "-o", tmp_path / "a.glb", "--smooth", "1,0")
+    assert code == 0
+    assert err == "facegen: warning: 26: never recorded, so at rest\n"
+    back = read_gltf_performance(tmp_path / "a.glb")
+    assert 0.1 < back.column("AU12_L").max() < 0.4
+    assert run("play", path, "-o", tmp_path / "b.glb", "--smooth", "much")[2].startswith("facegen: --smooth: expected")
+    assert run("play", path, "-o", tmp_path / "b.glb", "--recorded-fps", "-1")[2].startswith("facegen: --recorded-fps:")
+    assert not (tmp_path / "b.glb").exists()
+
+
+def test_convert_into_a_glb_and_back(run, take, tmp_path):
+    other = tmp_path / "take.csv"
+    assert run("convert", take, "-o", other, "--to", "csv")[0] == 0
+    code, text, _ = run("convert", other, "-o", tmp_path / "again.glb", "--json")
+    assert (code, json.loads(text)["format"]) == (0, "gltf")
+    first, again = (read_gltf_performance(path) for path in (take, tmp_path / "again.glb"))
+    np.testing.assert_allclose(again.weights, first.weights[:, [first.names.index(name) for name in again.names]],
+                               atol=1e-6)
+    np.testing.assert_allclose(again.head, first.head, atol=1e-3)

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 import facegen
-from facegen.animation.gltf_recording import read_gltf_performance, vocabulary_of
 from facegen.animation.performance import Performance
 from facegen.animation.playback import Playback
+from facegen.animation.streams.gltf import read_gltf_performance, vocabulary_of
 from facegen.blendshapes.recipes import shape_set
 from facegen.face.face import load_face
 from facegen.jobs.animated import save_animation
@@ -137,3 +137,12 @@ def test_a_head_that_cannot_turn(tmp_path, rig_file):
     made = save_animation(Playback(recorded()), tmp_path / "a.glb", face=rig_file("arkit", notes=False))
     assert made.warnings == ("arkit.glb has no joint that turns its head, and none can be added, so the head does not "
                              "turn in the file",)
+
+
+def test_a_head_alone(tmp_path, rig_file):
+    take = Performance(T, (), np.zeros((len(T), 0)), "arkit", head=HEAD)
+    for face in ("akimoto", rig_file("units")):
+        save_animation(Playback(take), tmp_path / "a.glb", face=face, detail=0)
+        assert np.abs(read_gltf_performance(tmp_path / "a.glb").head).max() == pytest.approx(30, abs=1e-3)
+    save_clip(take, tmp_path / "frames", face="akimoto-1986", fps=2, size=32, detail=0, renderer="soft")
+    assert len(list((tmp_path / "frames").glob("*.png"))) == 2
