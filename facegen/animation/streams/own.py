@@ -24,20 +24,21 @@ PARTS = {"head": ("head_yaw", "head_pitch", "head_roll"), "place": ("head_x", "h
          "gaze": ("gaze_yaw_L", "gaze_pitch_L", "gaze_yaw_R", "gaze_pitch_R")}
 _TIMES = (TIME, "seconds", "t")
 _COUNTS = ("frame", "frame_idx", "index", "")
+_ASIDE = frozenset(name.casefold() for names in (_TIMES, _COUNTS, *PARTS.values()) for name in names)
 
 
 def knows(sample: Sample) -> bool:
-    """Return whether a file has a time, or a name of a shape that is known."""
-    if {TIME, "frame"} & sample.columns and len(sample.columns) > 1:
+    """Return whether a file has a time, or mostly names of shapes that are known."""
+    if TIME in sample.columns and len(sample.columns) > 1:
         return True
-    return any(_names(sorted(sample.columns), name) for name in SETS)
+    shapes = sorted(sample.columns - _ASIDE)
+    return bool(shapes) and _vocabulary(shapes) is not None
 
 
 def read(path: Path, wish: Wish) -> Performance:
     """Return the performance of a file. FileError, InputError."""
     table = read_table(path)
-    aside = {name.casefold() for names in (_TIMES, _COUNTS, *PARTS.values()) for name in names}
-    shapes = [name for name in table.columns if name.casefold() not in aside and name in table.numbers]
+    shapes = [name for name in table.columns if name.casefold() not in _ASIDE and name in table.numbers]
     if not shapes:
         raise FileError(f"{path}: expected a column for each shape, such as jawOpen or AU12, beside '{TIME}'")
     vocabulary = _vocabulary(shapes) or "shapes"
