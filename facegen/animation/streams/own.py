@@ -5,6 +5,7 @@ Any vocabulary: units as AU12 or AU12_L, every other shape by its name. The voca
 
 from __future__ import annotations
 
+from functools import cache
 from pathlib import Path
 
 from numpy.typing import NDArray
@@ -76,13 +77,19 @@ def _names(columns: list[str], vocabulary: str) -> dict[str, str]:
     if vocabulary == "shapes":
         return {name: name for name in columns}
     if vocabulary != "units":
-        return match(columns, {shape: recipe.also for shape, recipe in shape_set(vocabulary).items()})
+        return match(columns, _known(vocabulary))
     codes, found = set(load_catalogue().codes), {}
     for name in columns:
         code = member_of(name.strip().upper())
         if code in codes and code not in found.values():
             found[name] = code
     return found
+
+
+@cache
+def _known(vocabulary: str) -> dict[str, tuple[str, ...]]:
+    """Return the shapes of a vocabulary and what others call them."""
+    return {shape: recipe.also for shape, recipe in shape_set(vocabulary).items()}
 
 
 def _vocabulary(columns: list[str]) -> str | None:
