@@ -158,6 +158,15 @@ class Playback(Timed):
         return Cue(*(None if one is None else (1.0 - share) * one[after - 1] + share * one[after]
                      for one in self.filled))
 
+    def on(self, rig: Rig, *, detail: int = 2) -> Callable[[float], Array]:
+        """Return what makes the vertices (n, 3), mm, of ``rig.mesh(detail)`` at a time in seconds; prepared once. ::
+
+            pose = Playback(performance).on(facegen.load_face())
+            vertices = pose(1.5)
+        """
+        shown = self.shown.on(rig, detail=detail)
+        return lambda t: shown(self.cue(t))
+
     def check(self, rig: Rig) -> tuple[str, ...]:
         """Return what to warn of on a rig; InputError if it can show none of the shapes."""
         driver = Driver(rig, self.performance.vocabulary, self.performance.names)

@@ -97,6 +97,11 @@ def test_what_workers_get_is_small_and_whole():
     assert play.shown == Playback(play.performance).shown
 
 
+def test_a_pose_at_a_time():
+    play, face = Playback(recorded([0.0, 1.0, 0.5])), facegen.load_face()
+    np.testing.assert_array_equal(play.on(face, detail=0)(0.05), play.shown.on(face, detail=0)(play.cue(0.05)))
+
+
 def test_corners_are_where_it_goes_farthest():
     play = Playback(recorded([0, 0.2, 1, 0.3, 0], head=np.array([[0.0, 0, 0], [9, 0, 0], [0, 0, 0], [-9, 0, 0],
                                                                  [0, 0, 0]])))
