@@ -18,13 +18,13 @@ from scipy import sparse
 
 from facegen.data import meshes_dir
 from facegen.errors import InputError, nearest
-from facegen.face.attach import attach
+from facegen.face.attach import Attachment, attach
 from facegen.face.deformer import Array, Deformer
 from facegen.face.eye import eyeball_radius
 from facegen.face.folds import fold_field
 from facegen.face.head import turn_head
 from facegen.face.landmarks import landmark_weights
-from facegen.face.loader import FaceData, read_face
+from facegen.face.loader import FINEST, FaceData, read_face
 from facegen.facs.deformation import Deformation, weighted_sum
 from facegen.facs.expressions import Resolution, resolve
 from facegen.geometry.mesh import Mesh, merge
@@ -34,7 +34,7 @@ from facegen.geometry.subdivision import inherited_sides, loop_once
 if TYPE_CHECKING:
     from facegen.face.avatar import AvatarFace
 
-MAX_DETAIL = 3
+MAX_DETAIL = FINEST
 """Finest subdivision level; every level samples the surface of this one."""
 
 AVATARS = (".glb", ".gltf", ".vrm")
@@ -136,6 +136,11 @@ class Face:
         return tuple((names[a], names[b], names[c]) for a, b, c in (r.points for r in self._data.regions))
 
     @property
+    def attachments(self) -> tuple[Attachment, ...]:
+        """The parts beside the skin, and what carries them."""
+        return self._data.attachments
+
+    @property
     def fold_names(self) -> tuple[str, ...]:
         """Names of the corrective folds."""
         return tuple(self._data.folds)
@@ -221,6 +226,8 @@ class Face:
         flat = np.moveaxis(cage.reshape(-1, *cage.shape[-2:]), 0, 1).reshape(cage.shape[-2], -1)
         skin = np.moveaxis((level.matrix @ flat).reshape(level.matrix.shape[0], -1, 3), 1, 0)
         skin = np.ascontiguousarray(skin).reshape(*batch, -1, 3)
+        if d.relief is not None:
+            skin += d.relief[:skin.shape[-2]]
         if len(d.folds) and np.any(controls.folds):
             skin += np.einsum("...f,fni->...ni", controls.folds, level.folds)
         for i, (centre, rows) in enumerate(zip(d.eye_centres, level.lid_vertices, strict=True)):
@@ -276,7 +283,7 @@ class Face:
         yaw, pitch = np.radians(gaze[..., 0]), np.radians(gaze[..., 1])
         axis = np.stack([np.sin(yaw) * np.cos(pitch), np.sin(pitch), np.cos(yaw) * np.cos(pitch)], axis=-1)
         cosine = np.einsum("...ni,...i->...n", d, axis) / np.maximum(distance, 1e-9)
-        least = eyeball_radius(cosine) + LID_THICKNESS
+        least = self._data.eye_size * eyeball_radius(cosine) + LID_THICKNESS
         push = np.where(d[..., 2] > 0, np.maximum(least / np.maximum(distance, 1e-9), 1.0), 1.0)
         skin[..., rows, :] = centre + d * push[..., None]
 
@@ -310,6 +317,8 @@ class Face:
             parent = parent[s.parent_face]
         faces = d.faces if detail == 0 else subs[detail - 1].faces
         neutral = matrix @ self.deformer.neutral
+        if d.relief is not None:
+            neutral += d.relief[:n]
         lids = []
         for lid, skin_of_lid, inner in zip(self.deformer.lids, d.lid_skin, d.lid_rims, strict=True):
             carried = np.unique(np.concatenate([lid.vertices, skin_of_lid]))
