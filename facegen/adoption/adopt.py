@@ -88,7 +88,7 @@ def make_face(mesh: Mesh, landmarks: Landmarks, *, name: str, source: str, hair:
     warnings = check_places(landmarks, mesh)
     frame = align(landmarks.points(mesh.vertices), base.landmarks)
     apart = take_apart(mesh, landmarks, frame, explicit=pieces)
-    places = apart.places(base.places)
+    places = apart.places(base.coarse_places)
     check_head(apart, places, base)
     shape = shape_of(base, apart.surface, places)
     space = space_between(base.cage.vertices, shape.cage)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, cached_property
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +20,8 @@ from facegen.fileio.obj import load_obj
 from facegen.geometry.mesh import Mesh
 from facegen.geometry.operators import Surface
 from facegen.geometry.subdivision import loop_levels
-from facegen.transfer.template import skin_places
+from facegen.transfer.sides import side_fields
+from facegen.transfer.template import DETAIL, skin_places
 
 BASE = "akimoto"
 
@@ -28,8 +29,8 @@ BASE = "akimoto"
 @dataclass(frozen=True, eq=False)
 class Base:
     """``data``: what its face.yaml says. ``cage`` of c vertices; ``matrix`` (n, c): from there to its smooth surface at
-    the finest level; ``surface`` of n vertices, at rest on the eyeballs; ``places``: landmark of the skin -> vertices
-    (3,) of the surface and weights (3,). All in mm."""
+    the finest level; ``surface`` of n vertices, at rest on the eyeballs, with the ``parents`` of its triangles on the
+    cage; ``coarse``: its first vertices, those of the transfer's template. All in mm."""
 
     folder: Path
     face: Face
@@ -38,12 +39,18 @@ class Base:
     matrix: sparse.csr_array
     surface: Surface
     parents: NDArray[np.int32]
-    places: Mapping[str, tuple[NDArray, NDArray]]
+    coarse: Surface
+    coarse_places: Mapping[str, tuple[NDArray, NDArray]]
 
     @property
     def landmarks(self) -> dict[str, NDArray[np.float64]]:
         """Places (3,) of the landmarks on the skin."""
-        return {name: weights @ self.surface.vertices[rows] for name, (rows, weights) in self.places.items()}
+        return {name: weights @ self.coarse.vertices[rows] for name, (rows, weights) in self.coarse_places.items()}
+
+    @cached_property
+    def sides(self) -> NDArray[np.float64]:
+        """Which side of lids and lips each vertex (n,) of the surface lies on: `side_fields`."""
+        return side_fields(self.surface, skin_places(self.face, self.surface, FINEST))
 
     def point(self, name: str) -> int:
         """Return the cage's vertex that a feature point is."""
@@ -71,6 +78,10 @@ def base_face() -> Base:
     face, data = load_face(BASE), read_data(folder / "face.yaml")
     cage = load_obj(folder / data["cage"])
     finest = loop_levels(len(cage.vertices), cage.faces, np.array(data["creases"]), FINEST, corners=data["corners"])[-1]
-    surface = Surface(face.mesh(FINEST).vertices[:finest.matrix.shape[0]], finest.faces)
-    return Base(folder, face, data, cage, finest.matrix, surface, finest.parent_face,
-                skin_places(face, surface, FINEST))
+    levels = {}
+    for detail in (DETAIL, FINEST):
+        mesh = face.mesh(detail)
+        faces = mesh.faces[mesh.face_parts == 0]
+        levels[detail] = Surface(mesh.vertices[:faces.max() + 1], faces)
+    return Base(folder, face, data, cage, finest.matrix, levels[FINEST], finest.parent_face, levels[DETAIL],
+                skin_places(face, levels[DETAIL], DETAIL))

@@ -21,22 +21,21 @@ from facegen.geometry.closest import Feet
 from facegen.geometry.fade import smooth_step
 from facegen.geometry.normals import vertex_normals
 from facegen.geometry.operators import Surface
-from facegen.transfer.registration import STEPS, Correspondence, Step, register
+from facegen.transfer.registration import Correspondence, register
 from facegen.transfer.sides import painted, settled, side_fields
 from facegen.transfer.template import placing
 
 Array = NDArray[np.float64]
 Places = Mapping[str, tuple[NDArray, NDArray]]
 
-CLOSER = (Step(1.0, 0.0, 1.0, 6.0, 2), Step(0.1, 0.0, 4.0, 4.0, 2))
-"""After the transfer's steps: here the surface itself is wanted, not partners alone."""
-
 # Landmarks that people set by eye on wide smooth places: the surface finds its own way there.
 _LOOSE = ("temple_", "jaw_", "head_", "neck")
-# Millimetres: a registered vertex farther than this from the head has no partner there.
+# Millimetres: a place of the surface farther than this from the head has no partner there.
 _REACH = 4.0
-# How much a vertex without a partner counts, and one of a lid's margin or the lips' line, beside the others.
-_ALONE, _EDGE = 0.02, 20.0
+# How often the cage is fitted to what its smooth surface is nearest to.
+_ROUNDS = 4
+# How much a vertex without a partner counts, one of an ear, and one of a lid's margin or the lips' line, beside others.
+_ALONE, _EAR, _EDGE = 0.02, 0.1, 20.0
 # How firmly the cage keeps its own evenness, beside one square millimetre a cage vertex.
 _EVEN = 0.02
 # Millimetres from lid margins and the lips' line over which the relief comes up: they must meet as the cage's do.
@@ -64,26 +63,64 @@ def shape_of(base: Base, head: Surface, places: Places) -> Shape:
     of_head = side_fields(head, places)
     shut = painted(head, places, of_head)
     places = settled(head, places, of_head)
-    sides = side_fields(base.surface, base.places)
     search = Correspondence(head, of_head, shut)
-    names = [name for name in base.places if name in places and not name.startswith(_LOOSE)]
-    targets = np.array([weights @ head.vertices[rows] for rows, weights in (places[name] for name in names)])
-    n = len(base.surface.vertices)
-    registered = register(base.surface, sides, placing(base.places, names, n), targets, search, (*STEPS, *CLOSER))
-    feet = search(registered, vertex_normals(registered, base.surface.faces), sides, reach=_REACH)
-    goal = np.where(feet.found[:, None], feet.points, registered)
+    registered, sides = _register(base, head, places, search)
     scale = _scale(base, registered)
-    cage = _close_lips(base, _fit_cage(base, goal, feet.found, scale))
-    cage = _tuck(base, cage, scale)
+    edges, ears = _edges(base), _ears(base)
+    # From the registration the cage takes where things are, and from the head, more and more closely, how it is formed.
+    coarse, n = len(registered), len(base.surface.vertices)
+    goal, weight = np.zeros((n, 3)), np.zeros(n)
+    goal[:coarse] = registered
+    weight[:coarse] = base.coarse.vertex_areas
+    held = edges[edges < coarse]
+    weight[held] *= _EDGE
+    cage = _fit_cage(base, goal, weight, scale)
+    closed = _closed(places, head)
+    area = base.surface.vertex_areas
+    for _ in range(_ROUNDS):
+        cage = _close_lips(base, cage) if closed else cage
+        smooth = base.matrix @ cage
+        feet = search(smooth, vertex_normals(smooth, base.surface.faces), sides, reach=_REACH)
+        goal = np.where(feet.found[:, None], feet.points, smooth)
+        weight = area * np.where(feet.found, 1.0, _ALONE) * np.where(ears, _EAR, 1.0)
+        weight[edges] = 0.0
+        goal[held] = registered[held]
+        weight[held] = _EDGE * base.coarse.vertex_areas[held]
+        cage = _fit_cage(base, goal, weight, scale)
+    cage = _tuck(base, _close_lips(base, cage) if closed else cage, scale)
     smooth = base.matrix @ cage
-    return Shape(cage, smooth + _relief_share(base, feet.found)[:, None] * (goal - smooth), feet, scale)
+    feet = search(smooth, vertex_normals(smooth, base.surface.faces), sides, reach=_REACH)
+    relief = np.where(feet.found[:, None], feet.points - smooth, 0.0)
+    return Shape(cage, smooth + _relief_share(base, feet.found & ~ears)[:, None] * relief, feet, scale)
+
+
+def _register(base: Base, head: Surface, places: Places, search: Correspondence) -> tuple[Array, Array]:
+    """Return the vertices of the base face's coarse surface in the head's shape, and the sides of the finest one's."""
+    names = [name for name in base.coarse_places if name in places and not name.startswith(_LOOSE)]
+    targets = np.array([weights @ head.vertices[rows] for rows, weights in (places[name] for name in names)])
+    n = len(base.coarse.vertices)
+    registered = register(base.coarse, base.sides[:n], placing(base.coarse_places, names, n), targets, search)
+    return registered, base.sides
+
+
+def _closed(places: Places, head: Surface) -> bool:
+    """Return whether the lips are closed, or all but."""
+    top, bottom = (weights @ head.vertices[rows] for rows, weights in
+                   (places[name] for name in ("mouth_inner_top", "mouth_inner_bottom")))
+    return bool(np.linalg.norm(top - bottom) < _CLOSED)
+
+
+def _ears(base: Base) -> NDArray[np.bool_]:
+    """Return which vertices (n,) of the surface are ear: their folds are finer than the cage and are not followed."""
+    names = (base.folder / "cage_names.txt").read_text(encoding="utf-8").split()
+    return base.matrix @ np.array([name.startswith("ear_") for name in names], float) > 0.5
 
 
 def _scale(base: Base, registered: Array) -> float:
     """Return how large the face is beside the base face's: its landmarks' spread."""
     spreads = []
-    for vertices in (registered, base.surface.vertices):
-        at = np.array([w @ vertices[rows] for rows, w in base.places.values()])
+    for vertices in (registered, base.coarse.vertices):
+        at = np.array([w @ vertices[rows] for rows, w in base.coarse_places.values()])
         spreads.append(np.sqrt(((at - at.mean(axis=0)) ** 2).sum()))
     return float(spreads[0] / spreads[1])
 
@@ -109,17 +146,15 @@ def _tuck(base: Base, cage: Array, scale: float) -> Array:
     return tucked
 
 
-def _fit_cage(base: Base, goal: Array, found: NDArray, scale: float) -> Array:
-    """Return the cage (c, 3) whose smooth surface comes nearest to goal (n, 3)."""
+def _fit_cage(base: Base, goal: Array, weight: Array, scale: float) -> Array:
+    """Return the cage (c, 3) whose smooth surface comes nearest to goal (n, 3); weight (n,)."""
     matrix, followers = _follower_matrix(base)
     own = base.cage.vertices
     free = np.setdiff1d(np.arange(len(own)), followers)
     spread = sparse.csc_array(matrix)[:, free]
     fixed = np.zeros_like(own)
     fixed[followers] = scale * (own - matrix @ own)[followers]
-    area = base.surface.vertex_areas
-    weight = area / area.sum() * len(own) * np.where(found, 1.0, _ALONE)
-    weight[_edges(base)] *= _EDGE
+    weight = weight / weight.sum() * len(own)
     left = base.matrix @ spread
     right = goal - base.matrix @ fixed
     laplace = _evenness(base)
@@ -141,10 +176,8 @@ def _evenness(base: Base) -> sparse.csr_array:
 
 
 def _close_lips(base: Base, cage: Array) -> Array:
-    """Return the cage with lips that are all but closed closed: both edges on one line, as the base face's are."""
+    """Return the cage with closed lips: both edges on one line, as the base face's are."""
     upper, lower = base.seam.T
-    if np.linalg.norm(cage[upper] - cage[lower], axis=1).max() > _CLOSED:
-        return cage
     cage = cage.copy()
     cage[upper] = cage[lower] = (cage[upper] + cage[lower]) / 2
     return cage
