@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from facegen.adoption.base import BASE, Base, base_face
 from facegen.adoption.checks import check_head
+from facegen.adoption.colours import colours_of
 from facegen.adoption.data import face_data, landmark_data
 from facegen.adoption.own import own_parts
 from facegen.adoption.parts import eyes_of, parts_of
@@ -21,7 +22,7 @@ from facegen.adoption.space import space_between
 from facegen.adoption.write import check_folder, save_folder, yaml_text
 from facegen.errors import FileError, InputError
 from facegen.facs.yamlfile import read_data
-from facegen.fileio.avatar import load_avatar
+from facegen.fileio.avatar import AvatarFile, load_avatar
 from facegen.fileio.obj import format_obj
 from facegen.geometry.mesh import Mesh, merge
 from facegen.geometry.operators import Surface
@@ -75,16 +76,17 @@ def adopt(head: str | Path, output: str | os.PathLike[str], *, landmarks: str | 
         raise FileError(f"head: expected a mesh file, got {str(head)!r}, which does not exist")
     source = load_avatar(path)
     marks = load_landmarks(landmarks, source.mesh, mesh_name=path.name, digest=source.digest)
-    made = make_face(source.mesh, marks, name=name or folder.resolve().name, hair=hair, pieces=pieces,
-                     source=f"made of {path.name} by facegen adopt")
+    made = make_face(source, marks, name=name or folder.resolve().name, hair=hair, pieces=pieces,
+                     origin=f"made of {path.name} by facegen adopt")
     save_folder(folder, made.files)
     return Adopted(folder, made.warnings, made.frame, made.residual, tuple(describe(made.apart.pieces)), made.eye_size)
 
 
-def make_face(mesh: Mesh, landmarks: Landmarks, *, name: str, source: str, hair: bool = False,
+def make_face(source: AvatarFile, landmarks: Landmarks, *, name: str, origin: str, hair: bool = False,
               pieces: Mapping[str, str] | None = None) -> Made:
-    """Return the files of the face that a head's mesh and landmarks make; see `adopt`. Raises InputError."""
-    base = base_face()
+    """Return the files of the face that a head and its landmarks make; see `adopt`. origin: what the face's ``source``
+    says. Raises InputError."""
+    base, mesh = base_face(), source.mesh
     warnings = check_places(landmarks, mesh)
     frame = align(landmarks.points(mesh.vertices), base.landmarks)
     apart = take_apart(mesh, landmarks, frame, explicit=pieces)
@@ -103,17 +105,19 @@ def make_face(mesh: Mesh, landmarks: Landmarks, *, name: str, source: str, hair:
     for entry in entries:
         if "fades" in entry:
             entry["fades"] = np.round(space([[0.0, y, 10.0] for y in entry["fades"]])[:, 1], 3).tolist()
-    data = face_data(base, shape, space, eyes, bite, name=name, source=source, parts=entries)
+    data = face_data(base, shape, space, eyes, bite, name=name, source=origin, parts=entries)
+    colours = colours_of(source, apart, own)
+    data |= {"colours": colours} if colours else {}
     marks = landmark_data(base, read_data(base.folder / "landmarks.yaml")["landmarks"], space,
                           {part: one.vertices for part, one in kept.items()}, eyes, apart.points)
     skin = Mesh(shape.surface, base.surface.faces, base.cage.materials, base.cage.face_materials[base.parents],
                 ("skin",), np.zeros(len(base.surface.faces), np.int32))
-    about = (f"{name}: {source}. Millimetres, +x subject's left, +y up, +z forward; the size is the base face's.\n"
+    about = (f"{name}: {origin}. Millimetres, +x subject's left, +y up, +z forward; the size is the base face's.\n"
              "docs/faces.md explains the keys. Vertices are counted from 0 in cage.obj, which is the base face's cage.")
     files = {"cage.obj": format_obj(base.cage.with_vertices(shape.cage), comment=about.splitlines()[0]),
              "surface.obj": format_obj(skin, comment="The cage's surface at level 3, with what the cage leaves out."),
              "parts.obj": format_obj(merge(list(kept.values()))), "face.yaml": yaml_text(about, data),
              "landmarks.yaml": yaml_text("Landmarks; docs/landmarks.md lists the names.",
-                                         {"source": source, "mesh": "cage.obj", "landmarks": marks})}
+                                         {"source": origin, "mesh": "cage.obj", "landmarks": marks})}
     residual = residual_of(Surface(shape.surface, base.surface.faces), base, apart.surface, shape.partners)
     return Made(files, frame, residual, apart, (*warnings, *apart.skin.notes, *notes), eyes.size)

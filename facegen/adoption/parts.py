@@ -27,6 +27,9 @@ _KEEP = 0.3
 _ROUNDS = 20
 # Millimetres: teeth are not drawn back farther than this, nor is what lies this far from the lips looked at.
 _DRAWN_BACK, _NEAR = 8.0, 12.0
+# Of the base face's clearance behind the lips, what a person's thinner lips still need; and how far back, in mm, teeth
+# are in front.
+_CLEAR, _FRONT = 0.6, 15.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,8 +95,8 @@ def _bite(base: Base, shape: Shape, space: Space, meshes: Mapping[str, Mesh]) ->
     found = similarity_between(at, space(at))
     teeth = np.concatenate([meshes[name].vertices for name in TEETH[:2] if name in meshes])
     before = -heights(teeth, base.surface)[0]
-    front = np.flatnonzero(before < _NEAR)
+    front = np.flatnonzero((before > 0) & (before < _NEAR) & (teeth[:, 2] > teeth[:, 2].max() - _FRONT))
     after = -heights(found.apply(teeth[front]), Surface(shape.surface, base.surface.faces))[0]
-    short = float((np.minimum(found.scale, 1.0) * before[front] - after).max(initial=0.0))
+    short = float((_CLEAR * before[front] - after).max(initial=0.0))
     back = np.array([0.0, 0.0, -min(max(short, 0.0), _DRAWN_BACK)])
     return Similarity(found.scale, found.rotation, found.offset + back)

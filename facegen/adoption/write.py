@@ -13,7 +13,7 @@ import yaml
 
 from facegen.errors import FileError
 
-_LINE_EACH = ("points", "measures", "scales", "jaw", "eyes", "head", "folds", "lid_follow", "landmarks")
+_LINE_EACH = ("points", "measures", "scales", "jaw", "eyes", "head", "folds", "lid_follow", "colours", "landmarks")
 _ROW_EACH = ("regions", "parts")
 
 

@@ -6,9 +6,10 @@ no code. A face is a rig: ``pose(what)`` gives vertices, ``mesh(detail)`` what t
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from functools import cache, cached_property, lru_cache
+from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -42,6 +43,9 @@ AVATARS = (".glb", ".gltf", ".vrm")
 
 BARE = (".obj", ".ply", ".stl")
 """Files of meshes, which cannot have any."""
+
+OFFERED = {"anny": "facegen.adoption.anny_heads"}
+"""Package -> the module whose ``face_of`` makes faces out of its heads: by name, as it lies in a room above."""
 
 DEEPEST_FOLD = 1.25
 """Largest amount of a fold."""
@@ -134,6 +138,11 @@ class Face:
         """The three feature points that bound each region."""
         names = self._data.point_names
         return tuple((names[a], names[b], names[c]) for a, b, c in (r.points for r in self._data.regions))
+
+    @property
+    def colours(self) -> Mapping[str, tuple[float, float, float]] | None:
+        """Material -> sRGB 0..255, where they are not the usual ones."""
+        return self._data.colours
 
     @property
     def attachments(self) -> tuple[Attachment, ...]:
@@ -378,32 +387,66 @@ def face_names() -> tuple[str, ...]:
     return tuple(_shipped())
 
 
-def load_face(face: str | Path = "akimoto") -> Face | AvatarFace:
-    """Return a face: a shipped one by name, another by the path of its folder or ``face.yaml``, or an avatar by the
-    path of a file with blendshapes (.glb, .gltf, .vrm).
+def is_face_name(face: str | Path) -> bool:
+    """Return whether this is the name of a face, shipped or offered by a package, and not a path."""
+    return str(face) in _shipped() or _offer(str(face)) is not None
 
-    >>> load_face().name
-    'akimoto'
-    """
+
+def face_file(face: str | Path) -> Path:
+    """Return the file of a face: the ``face.yaml`` of a shipped one by name, of one that a package offers ("anny:child"),
+    of a folder or a path, or an avatar's own. Raises InputError."""
     if not isinstance(face, (str, Path)):
         raise InputError(f"face: expected a name or a path, got {type(face).__name__}; see face_names()")
     shipped = _shipped()
     if str(face) in shipped:
-        return _load(shipped[str(face)])
+        return shipped[str(face)]
+    offer = _offer(str(face))
+    if offer is not None:
+        return offer(str(face).partition(":")[2])
     path = Path(face)
     if path.is_dir():
         path = path / "face.yaml"
     if not path.is_file():
         raise InputError(f"face: expected one of {', '.join(shipped)} or the path of a face.yaml or of a rigged avatar "
                          f"(.glb), got {str(face)!r}{nearest(str(face), shipped)}")
+    return path
+
+
+def _offer(face: str) -> Callable[[str], Path] | None:
+    """Return what makes the faces of a package, if "package:head" names one."""
+    package, colon, _ = face.partition(":")
+    return import_module(OFFERED[package]).face_of if colon and package in OFFERED else None
+
+
+def load_face(face: str | Path = "akimoto") -> Face | AvatarFace:
+    """Return a face: a shipped one by name, a head of the package anny by name ("anny:child"), another by the path of
+    its folder or ``face.yaml``, or an avatar by the path of a file with blendshapes (.glb, .gltf, .vrm).
+
+    >>> load_face().name
+    'akimoto'
+    """
+    path = face_file(face)
     suffix = path.suffix.lower()
     if suffix in BARE:
         raise InputError(f"face: {path} has no blendshapes; rig it first: facegen rig {path.name} "
-                         f"--landmarks {path.stem}.yaml -o {path.stem}.glb, then take {path.stem}.glb")
+                         f"--landmarks {path.stem}.yaml -o {path.stem}.glb, then take {path.stem}.glb; a human head can "
+                         f"also become a face of its own: facegen adopt {path.name} --landmarks {path.stem}.yaml "
+                         f"-o {path.stem}/")
     if suffix in AVATARS:
         state = path.stat()
         return _load_avatar(path.resolve(), state.st_mtime_ns, state.st_size)
-    return _load(path.resolve())
+    return _load(path) if path in _shipped().values() else _load_folder(path.resolve(), _changes(path))
+
+
+def _changes(path: Path) -> tuple[tuple[str, int, int], ...]:
+    """Return what tells that the files of a face's folder are others than before."""
+    states = ((one, one.stat()) for one in sorted(path.resolve().parent.iterdir()) if one.is_file())
+    return tuple((one.name, state.st_mtime_ns, state.st_size) for one, state in states)
+
+
+@lru_cache(maxsize=8)
+def _load_folder(path: Path, _changed: object) -> Face:
+    return Face(read_face(path))
 
 
 @cache

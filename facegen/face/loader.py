@@ -26,7 +26,7 @@ from facegen.geometry.subdivision import Subdivision, loop_levels
 REQUIRED = ("name", "source", "cage", "centre_O", "measures", "scales", "points", "regions", "jaw", "eyes",
             "lids", "head")
 OPTIONAL = ("sheets", "followers", "creases", "corners", "parts", "folds", "lid_follow", "head_half_height",
-            "landmarks", "surface", "eye_size")
+            "landmarks", "surface", "eye_size", "colours")
 CARRIERS = ("skull", "skin", "jaw", "eye", "mouth")
 ROLES = ("input", "jaw", "fixed")
 SIDES = ("L", "R")
@@ -34,6 +34,7 @@ FINEST = 3
 """The subdivision level whose surface all levels sample, and that a file ``surface`` describes."""
 EYE_SIZES = (0.2, 5.0)
 """Least and largest size of the eyeballs, times the base face's."""
+_BRIGHTEST = 255.0
 _FARTHEST = 1e6     # mm: no face is larger
 
 
@@ -68,6 +69,7 @@ class FaceData:
     folds: Mapping[str, Fold]
     takes_input: NDArray[np.bool_]
     landmarks: Mapping[str, Landmark]
+    colours: Mapping[str, tuple[float, float, float]] | None     # material -> sRGB 0..255, where not the usual ones
     relief: Array | None        # (n, 3) what the surface has beyond the smooth cage, at the finest level
 
 
@@ -219,7 +221,8 @@ def read_face(path: Path) -> FaceData:
         place(head["pivot"]), head_weight,
         top["head_half_height"].number(1e-6) if "head_half_height" in top
         else float(np.ptp(cage.vertices[:, 1]) / 2),
-        attachments, folds, np.array(takes_input), landmarks, relief)
+        attachments, folds, np.array(takes_input), landmarks,
+        {name: _colour(e) for name, e in top["colours"].items()} if "colours" in top else None, relief)
 
 
 def _integer(key: str) -> object:
@@ -232,6 +235,13 @@ def _some(entry: Entry, count: int | None, expected: str) -> list[Entry]:
     if (not items) if count is None else len(items) != count:
         raise entry.wrong(expected)
     return items
+
+
+def _colour(entry: Entry) -> tuple[float, float, float]:
+    found = entry.vector(_BRIGHTEST)
+    if min(found) < 0:
+        raise entry.wrong("three numbers from 0 to 255: red, green and blue in sRGB")
+    return found
 
 
 def _relief(entry: Entry, folder: Path, cage: Mesh, creases: NDArray, corners: NDArray) -> Array:
