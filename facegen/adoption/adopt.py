@@ -8,9 +8,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
-from facegen.adoption.base import BASE, Base, base_face
+from facegen.adoption.base import base_face
 from facegen.adoption.checks import check_head
 from facegen.adoption.colours import colours_of
 from facegen.adoption.data import face_data, landmark_data
@@ -20,7 +19,7 @@ from facegen.adoption.residual import Residual, residual_of
 from facegen.adoption.shape import shape_of
 from facegen.adoption.space import space_between
 from facegen.adoption.write import check_folder, save_folder, yaml_text
-from facegen.errors import FileError, InputError
+from facegen.errors import FileError
 from facegen.facs.yamlfile import read_data
 from facegen.fileio.avatar import AvatarFile, load_avatar
 from facegen.fileio.obj import format_obj
@@ -91,7 +90,7 @@ def make_face(source: AvatarFile, landmarks: Landmarks, *, name: str, origin: st
     frame = align(landmarks.points(mesh.vertices), base.landmarks)
     apart = take_apart(mesh, landmarks, frame, explicit=pieces)
     places = apart.places(base.coarse_places)
-    check_head(apart, places, base)
+    check_head(apart, base)
     shape = shape_of(base, apart.surface, places)
     space = space_between(base.cage.vertices, shape.cage)
     eyes = eyes_of(base, shape, space)

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import atexit
 import itertools
+import os
 import shutil
 import tempfile
 from collections.abc import Mapping
@@ -36,8 +38,8 @@ def head_names() -> tuple[str, ...]:
 
 
 def face_of(name: str) -> Path:
-    """Return the ``face.yaml`` of a head by the words of its name, such as "old-woman". Raises InputError: an unknown or
-    contradicting word, the package is not installed."""
+    """Return the ``face.yaml`` of a head by the words of its name, such as "old-woman". Raises InputError for an
+    unknown or contradicting word, and where the package is not installed."""
     targets = targets_of(name)
     folder = _kept(name, targets)
     if not (folder / "face.yaml").is_file():
@@ -52,10 +54,14 @@ def face_of(name: str) -> Path:
 def head_of(targets: Mapping[str, float]) -> tuple[Any, Landmarks]:
     """Return the mesh that targets make, in the package's units, and its landmarks."""
     mesh, numbers = head_mesh(targets)
-    rows = np.searchsorted(numbers, list(_table()["landmarks"].values()))
-    faces = np.array([np.flatnonzero((mesh.faces == row).any(axis=1))[0] for row in rows])
-    corners = mesh.faces[faces].astype(np.int64)
-    return mesh, Landmarks(tuple(_table()["landmarks"]), faces, corners, (corners == rows[:, None]).astype(float))
+    faces, shares = [], []
+    for at in _table()["landmarks"].values():
+        one = {int(np.searchsorted(numbers, int(vertex))): share
+               for vertex, share in (at if isinstance(at, Mapping) else {at: 1.0}).items()}
+        faces.append(np.flatnonzero(np.isin(mesh.faces, list(one)).sum(axis=1) == len(one))[0])
+        shares.append([one.get(int(corner), 0.0) for corner in mesh.faces[faces[-1]]])
+    found = np.array(faces)
+    return mesh, Landmarks(tuple(_table()["landmarks"]), found, mesh.faces[found].astype(np.int64), np.array(shares))
 
 
 def targets_of(name: str) -> dict[str, float]:
@@ -103,20 +109,20 @@ def _kept(name: str, targets: Mapping[str, float]) -> Path:
     files = [data_folder() / "targets" / f"{target}.target.gz" for target in targets]
     files.append(data_folder() / "3dobjs" / "base.obj")
     states = [f"{one.name} {one.stat().st_size}" for one in files if one.exists()]
-    key = content_key(*(one.read_text(encoding="utf-8") for one in sorted(sources)), *states, str(sorted(targets.items())))
+    texts = (one.read_text(encoding="utf-8") for one in sorted(sources))
+    folder = f"{PACKAGE}-{name.casefold()[:40]}-{content_key(*texts, *states, str(sorted(targets.items())))[:16]}"
     root = kept_in("faces")
     with suppress(OSError):
         if root is not None:
             root.folder.mkdir(parents=True, exist_ok=True)
-            return root.folder / f"{PACKAGE}-{name.casefold()[:40]}-{key[:16]}"
-    return _passing() / f"{PACKAGE}-{name.casefold()[:40]}-{key[:16]}"
+            if os.access(root.folder, os.W_OK):
+                return root.folder / folder
+    return _passing() / folder
 
 
 @cache
 def _passing() -> Path:
     """Return a folder that this process removes at its end, where nothing can be kept."""
-    import atexit
-
     folder = Path(tempfile.mkdtemp(prefix="facegen-"))
     atexit.register(shutil.rmtree, folder, ignore_errors=True)
     return folder
@@ -125,7 +131,7 @@ def _passing() -> Path:
 def _tidy(newest: Path) -> None:
     """Remove the faces that were made longest ago, of too many."""
     with suppress(OSError):
-        kept = sorted((one for one in newest.parent.glob(f"{PACKAGE}-*") if one.is_dir()), key=lambda f: f.stat().st_mtime)
-        for old in kept[:-_MOST]:
+        kept = [one for one in newest.parent.glob(f"{PACKAGE}-*") if one.is_dir()]
+        for old in sorted(kept, key=lambda one: one.stat().st_mtime)[:-_MOST]:
             if old != newest:
                 shutil.rmtree(old, ignore_errors=True)

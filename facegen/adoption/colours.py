@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from facegen.fileio.avatar import AvatarFile
 from facegen.geometry.mesh import Mesh
 from facegen.transfer.apart import Apart
+from facegen.transfer.piece_names import words_of
 
 # Millimetres round the tip of the nose that are face.
 _FACE = 60.0
@@ -18,6 +19,10 @@ _LIPS = ("mouth_top", "mouth_bottom", "mouth_upper_L", "mouth_upper_R", "mouth_l
 _SHARES = {"lips": (0.85, 0.60, 0.66), "nostril": (0.60, 0.47, 0.46)}
 # Two colours nearer than this are one.
 _SAME = 12.0
+# Word of a material's name -> of which kind of piece it must be, and what we call it.
+_NAMED = {"lip": ("skin", "lips"), "lips": ("skin", "lips"), "iris": ("eye", "iris"), "irises": ("eye", "iris")}
+# Of the iris' colour, its dark rim.
+_LIMBUS = 0.6
 
 
 def colours_of(source: AvatarFile, apart: Apart, own: Mapping[str, Mesh]) -> dict[str, list[float]]:
@@ -41,12 +46,28 @@ def colours_of(source: AvatarFile, apart: Apart, own: Mapping[str, Mesh]) -> dic
             result = {"skin": skin, **{name: skin * share for name, share in _SHARES.items()}}
             if np.linalg.norm(found - skin) > _SAME:
                 result["lips"] = found
-        for name, part in own.items():
+        result |= _named(source, apart)
+        for part in own.values():
             for index, material in enumerate(part.materials):
                 shown = mesh.materials[index]
                 if (part.face_materials == index).any() and shown in source.colours:
                     result[material] = np.array(source.colours[shown][:3])
     return {name: np.round(colour, 1).tolist() for name, colour in result.items()}
+
+
+def _named(source: AvatarFile, apart: Apart) -> dict[str, NDArray]:
+    """Return the colours of materials that are named after what they are: lips on the skin, irises on the eyes."""
+    result = {}
+    for piece in apart.pieces:
+        for index in np.unique(source.mesh.face_materials[piece.faces]):
+            name = source.mesh.materials[index]
+            for word in words_of(name) & _NAMED.keys() if name in source.colours else ():
+                kind, ours = _NAMED[word]
+                if piece.kind.startswith(kind):
+                    result[ours] = np.array(source.colours[name][:3], float)
+    if "iris" in result:
+        result["limbus"] = result["iris"] * _LIMBUS
+    return result
 
 
 def _of_triangles(source: AvatarFile) -> NDArray[np.float64] | None:

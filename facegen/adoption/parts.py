@@ -63,7 +63,7 @@ def eyes_of(base: Base, shape: Shape, space: Space) -> Eyes:
 
 
 def parts_of(base: Base, shape: Shape, space: Space, eyes: Eyes) -> tuple[dict[str, Mesh], Similarity]:
-    """Return name -> mesh of every part of the base face in the person's place, and what takes teeth and tongue there."""
+    """Return name -> mesh of every part of the base face in the person's place, and what takes teeth there."""
     meshes = {a.mesh.parts[0]: a.mesh for a in base.face.attachments}
     bite = _bite(base, shape, space, meshes)
     skins = base.surface, Surface(shape.surface, base.surface.faces)

@@ -38,6 +38,8 @@ _ROUNDS = 4
 _ALONE, _EAR, _EDGE = 0.02, 0.1, 20.0
 # How firmly the cage keeps its own evenness, beside one square millimetre a cage vertex.
 _EVEN = 0.02
+# How much a landmark counts, beside a cage vertex.
+_MARK = 2.0
 # Millimetres from lid margins and the lips' line over which the relief comes up: they must meet as the cage's do.
 _FADE = 5.0
 # Millimetres: lips nearer than this are closed.
@@ -64,7 +66,12 @@ def shape_of(base: Base, head: Surface, places: Places) -> Shape:
     shut = painted(head, places, of_head)
     places = settled(head, places, of_head)
     search = Correspondence(head, of_head, shut)
-    registered, sides = _register(base, head, places, search)
+    names = [name for name in base.coarse_places if name in places and not name.startswith(_LOOSE)]
+    marks = placing(base.coarse_places, names, len(base.coarse.vertices))
+    targets = np.array([weights @ head.vertices[rows] for rows, weights in (places[name] for name in names)])
+    sides = base.sides
+    registered = register(base.coarse, sides[:marks.shape[1]], marks, targets, search)
+    held_marks = sparse.csr_array(marks @ base.matrix[:marks.shape[1]]), targets
     scale = _scale(base, registered)
     edges, ears = _edges(base), _ears(base)
     # From the registration the cage takes where things are, and from the head, more and more closely, how it is formed.
@@ -74,7 +81,7 @@ def shape_of(base: Base, head: Surface, places: Places) -> Shape:
     weight[:coarse] = base.coarse.vertex_areas
     held = edges[edges < coarse]
     weight[held] *= _EDGE
-    cage = _fit_cage(base, goal, weight, scale)
+    cage = _fit_cage(base, goal, weight, held_marks, scale)
     closed = _closed(places, head)
     area = base.surface.vertex_areas
     for _ in range(_ROUNDS):
@@ -86,21 +93,12 @@ def shape_of(base: Base, head: Surface, places: Places) -> Shape:
         weight[edges] = 0.0
         goal[held] = registered[held]
         weight[held] = _EDGE * base.coarse.vertex_areas[held]
-        cage = _fit_cage(base, goal, weight, scale)
+        cage = _fit_cage(base, goal, weight, held_marks, scale)
     cage = _tuck(base, _close_lips(base, cage) if closed else cage, scale)
     smooth = base.matrix @ cage
     feet = search(smooth, vertex_normals(smooth, base.surface.faces), sides, reach=_REACH)
     relief = np.where(feet.found[:, None], feet.points - smooth, 0.0)
     return Shape(cage, smooth + _relief_share(base, feet.found & ~ears)[:, None] * relief, feet, scale)
-
-
-def _register(base: Base, head: Surface, places: Places, search: Correspondence) -> tuple[Array, Array]:
-    """Return the vertices of the base face's coarse surface in the head's shape, and the sides of the finest one's."""
-    names = [name for name in base.coarse_places if name in places and not name.startswith(_LOOSE)]
-    targets = np.array([weights @ head.vertices[rows] for rows, weights in (places[name] for name in names)])
-    n = len(base.coarse.vertices)
-    registered = register(base.coarse, base.sides[:n], placing(base.coarse_places, names, n), targets, search)
-    return registered, base.sides
 
 
 def _closed(places: Places, head: Surface) -> bool:
@@ -146,8 +144,9 @@ def _tuck(base: Base, cage: Array, scale: float) -> Array:
     return tucked
 
 
-def _fit_cage(base: Base, goal: Array, weight: Array, scale: float) -> Array:
-    """Return the cage (c, 3) whose smooth surface comes nearest to goal (n, 3); weight (n,)."""
+def _fit_cage(base: Base, goal: Array, weight: Array, marks: tuple[sparse.csr_array, Array], scale: float) -> Array:
+    """Return the cage (c, 3) whose smooth surface comes nearest to goal (n, 3) with weights (n,), and its landmarks,
+    weights (l, c), to their places (l, 3)."""
     matrix, followers = _follower_matrix(base)
     own = base.cage.vertices
     free = np.setdiff1d(np.arange(len(own)), followers)
@@ -160,8 +159,10 @@ def _fit_cage(base: Base, goal: Array, weight: Array, scale: float) -> Array:
     laplace = _evenness(base)
     even = (laplace @ spread)
     start = scale * (laplace @ own) - laplace @ fixed
-    normal = (left.T @ sparse.diags_array(weight) @ left + _EVEN * (even.T @ even)).toarray()
-    solved = np.linalg.solve(normal, left.T @ (weight[:, None] * right) + _EVEN * (even.T @ start))
+    at = marks[0] @ spread
+    normal = left.T @ sparse.diags_array(weight) @ left + _EVEN * (even.T @ even) + _MARK * (at.T @ at)
+    solved = np.linalg.solve(normal.toarray(), left.T @ (weight[:, None] * right) + _EVEN * (even.T @ start)
+                             + _MARK * (at.T @ (marks[1] - marks[0] @ fixed)))
     return spread @ solved + fixed
 
 

@@ -393,8 +393,8 @@ def is_face_name(face: str | Path) -> bool:
 
 
 def face_file(face: str | Path) -> Path:
-    """Return the file of a face: the ``face.yaml`` of a shipped one by name, of one that a package offers ("anny:child"),
-    of a folder or a path, or an avatar's own. Raises InputError."""
+    """Return the file of a face: the ``face.yaml`` of a shipped one by name, of a folder, of one that a package offers
+    ("anny:child"), or the path of one or of an avatar. Raises InputError."""
     if not isinstance(face, (str, Path)):
         raise InputError(f"face: expected a name or a path, got {type(face).__name__}; see face_names()")
     shipped = _shipped()
@@ -428,10 +428,9 @@ def load_face(face: str | Path = "akimoto") -> Face | AvatarFace:
     path = face_file(face)
     suffix = path.suffix.lower()
     if suffix in BARE:
-        raise InputError(f"face: {path} has no blendshapes; rig it first: facegen rig {path.name} "
-                         f"--landmarks {path.stem}.yaml -o {path.stem}.glb, then take {path.stem}.glb; a human head can "
-                         f"also become a face of its own: facegen adopt {path.name} --landmarks {path.stem}.yaml "
-                         f"-o {path.stem}/")
+        marks = f"{path.name} --landmarks {path.stem}.yaml -o {path.stem}"
+        raise InputError(f"face: {path} has no blendshapes; rig it first: facegen rig {marks}.glb, then take "
+                         f"{path.stem}.glb; of a human head you can also make a face: facegen adopt {marks}")
     if suffix in AVATARS:
         state = path.stat()
         return _load_avatar(path.resolve(), state.st_mtime_ns, state.st_size)
