@@ -82,7 +82,7 @@ def template_of(face: Face, shapes: Mapping[str, Recipe], *, detail: int = DETAI
     skin = mesh.part_vertices(mesh.parts[0])
     n = int(skin[-1]) + 1                                   # the skin comes first, all of its vertices are used
     surface = Surface(mesh.vertices[:n], mesh.faces[mesh.face_parts == 0])
-    places = _skin_places(face, surface, detail)
+    places = skin_places(face, surface, detail)
     together = joined(face, [shape.deformation for shape in shapes.values()])
     posed = face.pose_controls(together, detail=detail)
     motion = posed[:, :n] - surface.vertices
@@ -105,7 +105,7 @@ def template_of(face: Face, shapes: Mapping[str, Recipe], *, detail: int = DETAI
                     hinge, share, minus, tongue)
 
 
-def _skin_places(face: Face, surface: Surface, detail: int) -> dict[str, tuple[NDArray, NDArray]]:
+def skin_places(face: Face, surface: Surface, detail: int) -> dict[str, tuple[NDArray, NDArray]]:
     """Return the landmarks on the skin: as they are defined, which tells lips that touch apart; those of other parts,
     the brows', at the nearest place. The pupils are none of the skin's."""
     mesh = face.mesh(detail)
