@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from facegen.animation.clip import Clip
     from facegen.animation.performance import Performance
+    from facegen.animation.playback import Playback
     from facegen.animation.script import load_clip, morph
     from facegen.animation.streams.files import load_performance, save_performance
     from facegen.blendshapes.recipes import Recipe, shape_set
@@ -35,10 +36,12 @@ if TYPE_CHECKING:
     from facegen.fileio.images import contact_sheet, save_image
     from facegen.fileio.video import save_video
     from facegen.geometry.mesh import Mesh
+    from facegen.jobs.adopting import adopt
     from facegen.jobs.batch import run_batch
     from facegen.jobs.frames import save_clip, save_turn
     from facegen.jobs.rigging import rig
     from facegen.render import Renderer, Wireframe, render, render_passes, save_passes
+    from facegen.render.live import Live
     from facegen.transfer.rig import avatar_names
 
 __version__ = "0.1.0"
@@ -55,14 +58,17 @@ __all__ = [
     "FileError",
     "InputError",
     "JobError",
+    "Live",
     "Mesh",
     "NotationError",
     "Performance",
+    "Playback",
     "Recipe",
     "Renderer",
     "Resolution",
     "TableError",
     "Wireframe",
+    "adopt",
     "avatar_names",
     "canonical",
     "contact_sheet",
@@ -99,6 +105,7 @@ __all__ = [
 _HOMES = {
     "facegen.animation.clip": ("Clip",),
     "facegen.animation.performance": ("Performance",),
+    "facegen.animation.playback": ("Playback",),
     "facegen.animation.script": ("load_clip", "morph"),
     "facegen.animation.streams.files": ("load_performance", "save_performance"),
     "facegen.blendshapes.recipes": ("Recipe", "shape_set"),
@@ -115,9 +122,11 @@ _HOMES = {
     "facegen.fileio.images": ("contact_sheet", "save_image"),
     "facegen.fileio.video": ("save_video",),
     "facegen.geometry.mesh": ("Mesh",),
+    "facegen.jobs.adopting": ("adopt",),
     "facegen.jobs.batch": ("run_batch",),
     "facegen.jobs.frames": ("save_clip", "save_turn"),
     "facegen.jobs.rigging": ("rig",),
+    "facegen.render.live": ("Live",),
     "facegen.render.overlay": ("Wireframe",),
     "facegen.render.passes": ("render_passes",),
     "facegen.render.passfiles": ("save_passes",),
