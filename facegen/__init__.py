@@ -36,6 +36,7 @@ if TYPE_CHECKING:
     from facegen.fileio.images import contact_sheet, save_image
     from facegen.fileio.video import save_video
     from facegen.geometry.mesh import Mesh
+    from facegen.jobs.adopting import adopt
     from facegen.jobs.batch import run_batch
     from facegen.jobs.frames import save_clip, save_turn
     from facegen.jobs.rigging import rig
@@ -67,6 +68,7 @@ __all__ = [
     "Resolution",
     "TableError",
     "Wireframe",
+    "adopt",
     "avatar_names",
     "canonical",
     "contact_sheet",
@@ -120,6 +122,7 @@ _HOMES = {
     "facegen.fileio.images": ("contact_sheet", "save_image"),
     "facegen.fileio.video": ("save_video",),
     "facegen.geometry.mesh": ("Mesh",),
+    "facegen.jobs.adopting": ("adopt",),
     "facegen.jobs.batch": ("run_batch",),
     "facegen.jobs.frames": ("save_clip", "save_turn"),
     "facegen.jobs.rigging": ("rig",),

@@ -11,6 +11,7 @@ from typing import Annotated
 import typer
 
 from facegen import __version__
+from facegen.cli import adopt as adopting
 from facegen.cli import batch, convert, explain, figures, film, gallery, listing, picture, play
 from facegen.cli import rig as rigging
 from facegen.errors import FacegenError, InputError
@@ -35,6 +36,7 @@ app.command("turntable")(film.turntable)
 app.command("play")(play.play)
 app.command("rig")(rigging.rig)
 app.command("convert")(convert.convert)
+app.command("adopt")(adopting.adopt)
 
 
 def _version(asked: bool) -> None:

@@ -27,7 +27,7 @@ from facegen.animation.performance import Performance
 from facegen.animation.playback import Playback
 from facegen.data import tables_dir
 from facegen.errors import FileError, InputError, TableError
-from facegen.face.face import face_names, load_face
+from facegen.face.face import is_face_name, load_face
 from facegen.face.rig import Rig
 from facegen.facs.deformation import Deformation
 from facegen.facs.expressions import Resolution, resolve
@@ -190,7 +190,7 @@ def _prepared(face: object, size: tuple[int, int], view: tuple[float, float], de
     check_look(background=background)
     name = os.fspath(face)
     rig = load_face(name)
-    if name not in face_names():
+    if not is_face_name(name):
         name = str(Path(name).resolve())        # workers may have another folder
     mesh, level = neutral_mesh(rig, detail=detail, size=size, view=view, orthographic=False, flat=False, camera=None)
     return rig, name, mesh, int(level or 0), chosen

@@ -162,22 +162,24 @@ def test_a_column_that_is_not_there_names_the_nearest(table):
         found.column("name")
 
 
-CELL = st.one_of(st.floats(allow_nan=False, allow_infinity=False).map(repr), st.sampled_from(["", "nan", "x", '"', "1_0"]),
-                 st.text(max_size=5))
+FINITE = st.floats(allow_nan=False, allow_infinity=False)
+CELL = FINITE.map(repr) | st.sampled_from(["", "nan", "x", '"', "1_0"]) | st.text(max_size=5)
 
 
 @given(st.one_of(
     st.binary(max_size=300),
     st.lists(st.lists(CELL, min_size=1, max_size=5).map(",".join), max_size=8).map("\n".join).map(
         lambda text: text.encode("utf-8", "replace"))))
-@settings(deadline=None, max_examples=300)
+@settings(deadline=None, max_examples=120)
 def test_no_file_crashes_it(tmp_path_factory, content):
     path = tmp_path_factory.getbasetemp() / "fuzz.csv"
     path.write_bytes(content)
     try:
         found = read_table(path)
     except FacegenError as error:
-        assert str(path) in str(error)
+        found = str(error)
+    if isinstance(found, str):
+        assert str(path) in found
         return
     assert len(found) == len(found.lines) > 0
     for column in found.numbers.values():
@@ -187,7 +189,7 @@ def test_no_file_crashes_it(tmp_path_factory, content):
     assert set(found.columns) == {*found.numbers, *found.texts}
 
 
-@given(st.lists(st.lists(st.floats(allow_nan=False, allow_infinity=False), min_size=3, max_size=3), min_size=1, max_size=9))
+@given(st.lists(st.lists(FINITE, min_size=3, max_size=3), min_size=1, max_size=9))
 @settings(deadline=None, max_examples=60)
 def test_numbers_come_back_to_the_last_bit(tmp_path_factory, rows):
     path = tmp_path_factory.getbasetemp() / "numbers.csv"

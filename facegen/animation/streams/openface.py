@@ -110,6 +110,8 @@ def write(one: Performance, path: Path) -> None:
     made = {tabular.spelt(name, before): now for name, now in columns.items()}
     result = dict(before)
     for name, now in made.items():
+        if before and name not in before and name not in strong:
+            continue                                    # a file without gaze or pose gets none
         kept = before.get(name) if name in ("frame", "confidence", "success") else None
         result[name] = kept if kept is not None else tabular.again(
             name, now, before, _ROUGH if name.casefold().startswith("gaze") else 1e-9)

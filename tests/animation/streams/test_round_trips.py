@@ -123,7 +123,7 @@ def test_the_suffix_and_what_was_read_choose_the_format(load, tmp_path):
     for name, match in (("b.xyz", "expected a name that ends in .csv"), ("nothing/b.csv", "does not exist")):
         with pytest.raises(FileError, match=match):
             save_performance(bare, tmp_path / name, *(["csv"] if "/" in name else []))
-    with pytest.raises(FileError, match="ends in .csv for livelink, got .json"):
+    with pytest.raises(FileError, match=r"ends in \.csv for livelink, got \.json"):
         save_performance(bare, tmp_path / "b.json", format="livelink")
     with pytest.raises(InputError, match="did you mean 'openface'"):
         save_performance(bare, tmp_path / "b.csv", format="openfase")
@@ -162,13 +162,21 @@ def test_a_write_that_fails_leaves_what_was_there(load, tmp_path, monkeypatch):
     assert sorted(path.name for path in tmp_path.iterdir()) == ["out.csv", "r.csv"]
 
 
+def read_or_refused(path, **how):
+    """Return the performance of a file, or why there is none; any other error goes through."""
+    try:
+        return load_performance(path, **how)
+    except FacegenError as error:
+        return str(error)
+
+
 MUTATIONS = st.lists(st.tuples(st.integers(0, 10_000), st.sampled_from(["cut", "byte", "drop", "twice", "line"]),
                                st.integers(0, 255)), min_size=1, max_size=4)
 
 
 @pytest.mark.parametrize("kind", FILES)
 @given(changes=MUTATIONS)
-@settings(deadline=None, max_examples=150)
+@settings(deadline=None, max_examples=60)
 def test_no_broken_file_crashes_a_reader(kind, changes, tmp_path_factory):
     name, text = FILES[kind]
     content = bytearray(text.encode()[:6000])
@@ -187,26 +195,21 @@ def test_no_broken_file_crashes_a_reader(kind, changes, tmp_path_factory):
     path = tmp_path_factory.getbasetemp() / f"broken-{name}"
     path.write_bytes(bytes(content))
     for how in ({"fps": 30.0}, {"format": kind}):
-        try:
-            one = load_performance(path, **how)
-        except FacegenError as error:
-            assert str(path) in str(error)
-        else:
-            assert len(one) == len(one.weights)
+        found = read_or_refused(path, **how)
+        assert str(path) in found if isinstance(found, str) else len(found) == len(found.weights)
 
 
-JSON = st.recursive(st.none() | st.booleans() | st.floats() | st.text(max_size=4) | st.sampled_from(["jawOpen", "score"]),
+WORDS = st.text(max_size=4) | st.sampled_from(["jawOpen", "score"])
+JSON = st.recursive(st.none() | st.booleans() | st.floats() | WORDS,
                     lambda inner: st.lists(inner, max_size=3) | st.dictionaries(st.sampled_from(
                         ["frames", "faceBlendshapes", "categories", "categoryName", "score", "timestampMs", "time",
                          "facialTransformationMatrixes", "data", "jawOpen"]), inner, max_size=4), max_leaves=12)
 
 
 @given(JSON)
-@settings(deadline=None, max_examples=200)
+@settings(deadline=None, max_examples=80)
 def test_no_json_crashes_the_reader(tmp_path_factory, value):
     path = tmp_path_factory.getbasetemp() / "any.json"
     path.write_text(json.dumps(value))
-    try:
-        load_performance(path, format="mediapipe")
-    except FacegenError as error:
-        assert str(path) in str(error)
+    found = read_or_refused(path, format="mediapipe")
+    assert str(path) in found if isinstance(found, str) else len(found) == len(found.weights)

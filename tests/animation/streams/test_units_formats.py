@@ -165,7 +165,8 @@ def test_libreface(load):
     ("0,1\n0.04,2\n0.02,3\n0.06,4", [0, 0.02, 0.04, 0.06], "line 4: earlier than the line before; put in the order"),
     ("0,1\n0.04,2\n0.04,3\n0.06,4", [0, 0.04, 0.06], "line 4: the time of another line; left out"),
     ("0,1\nnan,2\n0.02,3\n0.04,4", [0, 0.02, 0.04], "line 3: no time; left out"),
-    ("0,1\n0.02,2\n0.04,3\n0.3,4\n0.32,5\n0.6,6", None, r"gaps of 0.26 s after line 4 \(at 0.040 s\), 0.28 s after line 6"),
+    ("0,1\n0.02,2\n0.04,3\n0.3,4\n0.32,5\n0.6,6", None,
+     r"gaps of 0.26 s after line 4 \(at 0.040 s\), 0.28 s after line 6"),
 ])
 def test_times_that_are_odd(load, rows, times, message):
     one = load(f"time,AU12\n{rows}\n")
