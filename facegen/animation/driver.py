@@ -208,7 +208,7 @@ class _AvatarDriver(Driver):
         """Return the weights (s,) of the avatar's shapes, and how the head turns (4,): see `AvatarFace.turned`."""
         weights, off = self._split(weights, head, gaze)
         made, turn = np.zeros(self._made.shape[1]), np.zeros(4)
-        if len(self._made):
+        if len(self._made) and not self.direct.all():
             amounts = self.meaning.coefficients(np.clip(weights, 0.0, 1.0), off | self.direct)
             turn = amounts @ self._head
             made = self._sum(self._held(amounts))

@@ -144,7 +144,7 @@ def film(clip: Motion, out: Path, *, fps: float, size: str, view: str, renderer:
 def _animation(clip: Motion, out: Path, *, fps: float, face: str, detail: int | None, json: bool, quiet: bool,
                about: dict[str, Any]) -> None:
     """Write an animation into a glTF file, and tell of it."""
-    from facegen.jobs.animated import save_animation
+    from facegen.animation.animated import save_animation
 
     made = save_animation(clip, out, face=face, fps=fps, detail=detail)
     warnings = [*clip.warnings, *made.warnings]

@@ -58,9 +58,9 @@ def own_joint(scene: GltfScene) -> Joint | None:
         extras = node.value.get("extras")
         if isinstance(extras, dict) and extras.get("facegen") == NECK:
             return Joint(number, np.eye(3), np.eye(3), np.array(node["translation"].numbers(3)))
-    joints = {joint.index(len(nodes), "node") for skin in tree.items("skins") for joint in skin.items("joints")}
     number = _of_vrm(scene.file.json)
-    if number not in joints:
+    if number is None or not 0 <= number < len(nodes):
+        joints = {joint.index(len(nodes), "node") for skin in tree.items("skins") for joint in skin.items("joints")}
         number = next((one for one in sorted(joints) if isinstance(nodes[one].value.get("name"), str)
                        and _HEAD.fullmatch(nodes[one].value["name"].strip())), None)
     if number is None or nodes[number].get("matrix"):

@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from facegen import __version__
+from facegen.animation.animated import save_animation
 from facegen.animation.clip import Clip
 from facegen.animation.easing import min_jerk
 from facegen.animation.motion import Motion, Shown, Timed, frame_time
@@ -37,7 +38,6 @@ from facegen.fileio.images import without_full_alpha, write_whole
 from facegen.fileio.textfile import make_folder, save_text
 from facegen.fileio.video import FORMATS, check_film, save_video
 from facegen.geometry.camera import Camera, check_view, frame
-from facegen.jobs.animated import save_animation
 from facegen.jobs.digests import digest_of, face_digest, file_digest
 from facegen.jobs.runner import Report, run, shared
 from facegen.render.backends import choose, warm
@@ -116,8 +116,8 @@ def save_clip(clip: Motion | Performance, path: str | os.PathLike[str], *, fps: 
 
     clip: a `Clip`, a `Performance`, or a `Playback` of one. path: .mp4, .webm, .gif, .webp, .apng or .png; a name
     without suffix is a folder that gets ``frame_00001.png`` and so on; .glb, .gltf or .vrm becomes an animation of
-    blendshapes, see `facegen.jobs.animated.save_animation`, for which the camera's options do not count. face: a face's
-    name or path. workers: processes that draw; in a script, more than 1 needs the usual
+    blendshapes, see `facegen.animation.animated.save_animation`, for which the camera's options do not count. face: a
+    face's name or path. workers: processes that draw; in a script, more than 1 needs the usual
     ``if __name__ == "__main__":``. step: called once a frame. The rest is as for `Renderer`; the camera stands still
     and shows all that the clip reaches.
 

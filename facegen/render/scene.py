@@ -6,7 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
 
-Colour = tuple[float, float, float]
+from facegen.face.colours import CLAY as CLAY_COLOUR
+from facegen.face.colours import COLOURS, Colour
 
 
 @dataclass(frozen=True)
@@ -45,24 +46,24 @@ _SKIN_WRAP = (0.32, 0.21, 0.16)
 _WET_WRAP = (0.25, 0.12, 0.10)
 
 MATERIALS: Mapping[str, Material] = MappingProxyType({
-    "skin": Material((224, 174, 148), 0.085, 18.0, _SKIN_WRAP),
-    "nostril": Material((134, 82, 68), 0.02, 10.0, _SKIN_WRAP),
-    "lips": Material((190, 104, 98), 0.12, 34.0, _WET_WRAP),
-    "brows": Material((78, 52, 36), 0.02, 10.0, (0.1, 0.1, 0.1)),
-    "lashes": Material((62, 38, 30), 0.02, 10.0),
-    "hair": Material((74, 49, 34), 0.05, 10.0, (0.15, 0.15, 0.15)),
-    "sclera": Material((230, 225, 220), 0.25, 300.0, (0.35, 0.30, 0.28), 0.5, 0.25),
-    "iris": Material((98, 72, 48), 0.25, 300.0, (0.3, 0.3, 0.3), 0.9, 0.25),
-    "limbus": Material((60, 44, 32), 0.25, 300.0, (0.3, 0.3, 0.3), 0.9, 0.25),
-    "pupil": Material((16, 12, 11), 0.25, 300.0, (0.0, 0.0, 0.0), 0.9),
-    "teeth": Material((242, 231, 213), 0.15, 60.0, (0.25, 0.2, 0.15), lift=0.72),
-    "gums": Material((176, 92, 88), 0.12, 40.0, _WET_WRAP, lift=0.3),
-    "tongue": Material((186, 96, 92), 0.10, 30.0, _WET_WRAP, lift=0.12),
-    "mouth": Material((92, 34, 30), 0.05, 30.0, lift=0.5),
+    "skin": Material(COLOURS["skin"], 0.085, 18.0, _SKIN_WRAP),
+    "nostril": Material(COLOURS["nostril"], 0.02, 10.0, _SKIN_WRAP),
+    "lips": Material(COLOURS["lips"], 0.12, 34.0, _WET_WRAP),
+    "brows": Material(COLOURS["brows"], 0.02, 10.0, (0.1, 0.1, 0.1)),
+    "lashes": Material(COLOURS["lashes"], 0.02, 10.0),
+    "hair": Material(COLOURS["hair"], 0.05, 10.0, (0.15, 0.15, 0.15)),
+    "sclera": Material(COLOURS["sclera"], 0.25, 300.0, (0.35, 0.30, 0.28), 0.5, 0.25),
+    "iris": Material(COLOURS["iris"], 0.25, 300.0, (0.3, 0.3, 0.3), 0.9, 0.25),
+    "limbus": Material(COLOURS["limbus"], 0.25, 300.0, (0.3, 0.3, 0.3), 0.9, 0.25),
+    "pupil": Material(COLOURS["pupil"], 0.25, 300.0, (0.0, 0.0, 0.0), 0.9),
+    "teeth": Material(COLOURS["teeth"], 0.15, 60.0, (0.25, 0.2, 0.15), lift=0.72),
+    "gums": Material(COLOURS["gums"], 0.12, 40.0, _WET_WRAP, lift=0.3),
+    "tongue": Material(COLOURS["tongue"], 0.10, 30.0, _WET_WRAP, lift=0.12),
+    "mouth": Material(COLOURS["mouth"], 0.05, 30.0, lift=0.5),
 })
 
 # A material name that the scene does not know is drawn in plain clay.
-CLAY = Material((200, 190, 180), 0.04, 16.0)
+CLAY = Material(CLAY_COLOUR, 0.04, 16.0)
 # Back faces - the inner side of the skin, seen through open lips - are drawn in this, without direct light.
 INSIDE = Material((84, 36, 32), 0.0, 1.0)
 

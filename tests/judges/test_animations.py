@@ -9,11 +9,13 @@ from rigged import missing, picture
 from scipy.spatial import cKDTree
 from test_threejs import keep
 from test_validator import complaints
+from vrm_avatars import vrm_avatar
 
 import facegen
+from facegen.animation.animated import save_animation
 from facegen.animation.playback import Playback
 from facegen.animation.streams.gltf import read_gltf_performance
-from facegen.jobs.animated import save_animation
+from facegen.face.head import rotation
 
 NAMES = ("eyeBlinkLeft", "jawOpen", "mouthSmileLeft", "browInnerUp", "cheekPuff")
 TIMES = (0.0, 0.21, 0.5, 0.9)
@@ -72,3 +74,24 @@ def test_threejs_plays_it(takes, judges, tmp_path, name):
     pictures = [picture(seen["pictures"][f"at {t:g}"]) for t in TIMES[1:]]
     assert all(np.abs(one - picture(seen["pictures"][""])).max() > 30 for one in pictures)
     keep(seen, f"animation-{name}")
+
+
+def test_the_head_of_a_vrm_avatar_turns(validate, judges, tmp_path):
+    if chromium() is None:
+        missing("Chromium is not installed")
+    path, marks = vrm_avatar(tmp_path)
+    rigged = facegen.rig(path, tmp_path / "rigged.vrm", landmarks=marks, sets=["arkit"], shapes=["jawOpen"]).path
+    made = save_animation(recorded(), tmp_path / "take.vrm", face=rigged)
+    assert not [one for one in made.warnings if "head" in one]
+    assert complaints(validate(made.path)) == complaints(validate(rigged))
+    still, turned = seen_by_threejs(judges, made.path, [], tmp_path / "profile", (0.0, 0.5))["moments"]
+    play = recorded()
+    head, axes = [rotation(play.cue(t).head) for t in (0.0, 0.5)], facegen.load_face(rigged).notes.rotation
+    relative = axes.T @ head[1] @ head[0].T @ axes
+    for one, other in zip(still, turned, strict=True):
+        first, then = (np.array(mesh["places"]).reshape(-1, 3) for mesh in (one, other))
+        if "hair" not in one["name"] and "hat" not in one["name"] and "eye" not in one["name"].lower():
+            continue
+        # Rigid parts of the head turn by the difference of the two rotations about the neck.
+        first, then = first - first.mean(0), then - then.mean(0)
+        np.testing.assert_allclose(then, first @ relative.T, atol=2e-3 * np.ptp(first))

@@ -15,8 +15,8 @@ from rigged import rows_of, written
 from scipy.spatial import cKDTree
 
 import facegen
+from facegen.animation.animated import save_animation
 from facegen.animation.playback import Playback
-from facegen.jobs.animated import save_animation
 
 PYTHON = os.environ.get("FACEGEN_BPY") or (sys.executable if importlib.util.find_spec("bpy") else None)
 

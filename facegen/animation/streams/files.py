@@ -80,8 +80,8 @@ def save_performance(performance: Performance, path: str | os.PathLike[str], for
     if lost:
         said = f"{one.name} has no place for {' and '.join(lost)}; not written"
         performance = replace(performance, warnings=(*performance.warnings, said))
-    one.write(performance, place)
-    return performance
+    said = one.write(performance, place) or ()
+    return replace(performance, warnings=(*performance.warnings, *said))
 
 
 def _presence(value: float | None) -> float | None:

@@ -55,7 +55,8 @@ class Sample:
 class Format:
     """One format. ``about``: a line for people. ``suffixes``: what its files end in, the first being usual.
 
-    knows: whether a sample is of this format; they are asked in order. read, write: None where it cannot be.
+    knows: whether a sample is of this format; they are asked in order. read, write: None where it cannot be; what is
+    written otherwise than it was, write returns as warnings.
     vocabulary: what it holds, to which other performances are converted before they are written; None: any. sides: it
     tells left from right. parts: what it holds of head, place and gaze.
     """
@@ -65,7 +66,7 @@ class Format:
     suffixes: tuple[str, ...]
     knows: Callable[[Sample], bool]
     read: Callable[[Path, Wish], Performance] | None = None
-    write: Callable[[Performance, Path], None] | None = None
+    write: Callable[[Performance, Path], tuple[str, ...] | None] | None = None
     vocabulary: str | None = None
     sides: bool = True
     parts: tuple[str, ...] = ("head", "place", "gaze")

@@ -1,8 +1,9 @@
-"""The animation of a glTF file as a performance. `facegen.jobs.animated` writes one, for it takes a face."""
+"""The animation of a glTF file as a performance, and a performance as an animation of the base face."""
 
 from __future__ import annotations
 
 import os
+from collections.abc import Collection
 from pathlib import Path
 
 from facegen.animation.performance import Performance
@@ -27,30 +28,45 @@ def read(path: Path, wish: Wish) -> Performance:
     return read_gltf_performance(path, int(wish.person) if number else wish.person)
 
 
+def write(one: Performance, path: Path) -> tuple[str, ...]:
+    """Write a performance as an animation of the base face, and return what was changed: gaps, angles beyond reach."""
+    from facegen.animation.animated import save_animation
+    from facegen.animation.playback import Playback
+
+    play = Playback(one)
+    made = save_animation(play, path)
+    return tuple(warning for warning in (*play.warnings, *made.warnings) if warning not in one.warnings)
+
+
 def read_gltf_performance(path: str | os.PathLike[str], animation: str | int | None = None) -> Performance:
     """Return the weights of morph targets over time in a .glb, .gltf or .vrm file.
 
     animation: its name or its number, counted from 0; the first that has weights without. The vocabulary is the set
-    whose names, written as its owner does, these are, else "shapes". ``head`` is there in files that facegen wrote.
-    Raises FileError, or InputError for the animation. ::
+    whose names, written as its owner does, all shapes that move are of - of other sets nothing is kept then - or else
+    "shapes". ``head`` is there in files that facegen wrote. Raises FileError, or InputError for the animation. ::
 
         facegen.save_clip(read_gltf_performance("take.glb"), "take.mp4", face="human.glb")
     """
     found = read_weight_animation(path, animation)
-    head = None
+    notes, head = read_notes(found.notes, str(path)), None
     if found.turn is not None:
-        turn = read_notes(found.notes, str(path)).rotation
-        head = angles(turn @ rotations(found.turn) @ turn.T)
+        head = angles(notes.rotation @ rotations(found.turn) @ notes.rotation.T)
+    # What corrects a shape half way follows from that shape.
+    kept = [k for k, name in enumerate(found.names) if name not in set(notes.halves.values())]
+    moving = {found.names[k] for k in kept if found.weights[:, k].any()}
+    vocabulary = vocabulary_of(moving or {found.names[k] for k in kept})
+    if vocabulary != "shapes":
+        kept = [k for k in kept if found.names[k] in shape_set(vocabulary)]
     about = {"format": GLTF.name, "path": os.fspath(path), "animation": found.name}
-    return Performance(found.times, found.names, found.weights, vocabulary_of(found.names), head=head, about=about,
-                       warnings=found.warnings)
+    return Performance(found.times, tuple(found.names[k] for k in kept), found.weights[:, kept], vocabulary, head=head,
+                       about=about, warnings=found.warnings)
 
 
-def vocabulary_of(names: tuple[str, ...]) -> str:
+def vocabulary_of(names: Collection[str]) -> str:
     """Return the set of shapes that all of these names belong to, or "shapes". Units in files are coefficients, after
     all combinations, so those are "shapes" too."""
     return next((kind for kind in SETS if kind != "units" and set(names) <= set(shape_set(kind))), "shapes")
 
 
-GLTF = Format("gltf", "weights of morph targets over time in a glTF file (.glb, .gltf, .vrm); facegen play writes it",
-              SUFFIXES, knows, read)
+GLTF = Format("gltf", "weights of morph targets over time in a glTF file; written on the base face (.glb)", SUFFIXES,
+              knows, read, write, parts=("head", "gaze"))

@@ -73,7 +73,7 @@ def test_what_was_changed_is_written_changed(load, tmp_path):
     assert list(again.extra["x_0"]) == list(one.extra["x_0"])
 
 
-@pytest.mark.parametrize("kind", FORMATS)
+@pytest.mark.parametrize("kind", [kind for kind in FORMATS if kind != "gltf"])   # float32, no gaps: test_animated.py
 def test_a_performance_survives_each_format(kind, tmp_path):
     """What a format can hold comes back, with gaps, of a performance that was never in a file."""
     rng = np.random.default_rng(1)
@@ -120,7 +120,7 @@ def test_the_suffix_and_what_was_read_choose_the_format(load, tmp_path):
     bare = Performance([0.0], ("12",), [[0.5]], "units")
     with pytest.raises(InputError, match=r"say which format it is to be: livelink, openface"):
         save_performance(bare, tmp_path / "b.csv")
-    for name, match in (("b.xyz", "expected a name that ends in .csv"), ("nothing/b.csv", "does not exist")):
+    for name, match in (("b.xyz", "expected a name that ends in .*csv"), ("nothing/b.csv", "does not exist")):
         with pytest.raises(FileError, match=match):
             save_performance(bare, tmp_path / name, *(["csv"] if "/" in name else []))
     with pytest.raises(FileError, match=r"ends in \.csv for livelink, got \.json"):

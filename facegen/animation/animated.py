@@ -19,6 +19,7 @@ from facegen.animation.motion import Motion
 from facegen.blendshapes.recipes import Recipe, shape_set
 from facegen.face.avatar import AvatarFace
 from facegen.face.avatar_notes import METRE
+from facegen.face.colours import CLAY, COLOURS
 from facegen.face.face import Face, load_face
 from facegen.face.head import rotation
 from facegen.face.motion import shape_motion
@@ -26,7 +27,6 @@ from facegen.fileio.avatar import ANIMATED, AvatarFile, save_animated, with_shap
 from facegen.fileio.gltf_animate import Keys
 from facegen.fileio.gltf_neck import Neck
 from facegen.fileio.textfile import check_place
-from facegen.render.scene import CLAY, MATERIALS
 
 Array = NDArray[np.float64]
 
@@ -87,7 +87,7 @@ def as_avatar(face: Face, recipes: Mapping[str, Recipe], detail: int) -> tuple[A
         "neck": (face.neck / METRE).tolist(), "sets": sorted({one.set for one in recipes.values()}),
         "shapes": {name: {"set": one.set} for name, one in recipes.items()},
         "pieces": {part: "skull" if part in _SKULL else part for part in mesh.parts}}
-    colours = {name: MATERIALS.get(name, CLAY).albedo for name in mesh.materials}
+    colours = {name: COLOURS.get(name, CLAY) for name in mesh.materials}
     file = AvatarFile(Path(f"{face.name}.glb"), "obj", mesh.with_vertices(mesh.vertices / METRE), colours)
     motion = shape_motion(face, recipes, detail=detail) / METRE
     file, rows = with_shapes(file, dict(zip(recipes, motion, strict=True)), notes=notes)

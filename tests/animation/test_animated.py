@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 import facegen
+from facegen.animation.animated import save_animation
 from facegen.animation.performance import Performance
 from facegen.animation.playback import Playback
 from facegen.animation.streams.gltf import read_gltf_performance, vocabulary_of
 from facegen.blendshapes.recipes import shape_set
 from facegen.face.face import load_face
-from facegen.jobs.animated import save_animation
 from facegen.jobs.frames import save_clip
 
 T = np.arange(12) / 10
@@ -71,6 +71,28 @@ def test_the_parametric_face_gets_a_file_of_its_own(tmp_path, names, vocabulary)
     assert made.keys == len(T)
     for t in (0.0, 0.6):
         assert off(face, take, tmp_path / "take.glb", t) < 0.12
+
+
+def test_of_a_file_with_many_shapes_the_set_that_moves_is_read(tmp_path, rig_file):
+    rig = rig_file("units", "arkit")
+    save_clip(recorded(), tmp_path / "take.glb", face=rig)
+    back = read_gltf_performance(tmp_path / "take.glb")
+    assert (back.vocabulary, set(back.names)) == ("arkit", set(shape_set("arkit")))
+    take, again = Playback(recorded()), Playback(back)
+    np.testing.assert_allclose(again.on(load_face(rig))(0.4), take.on(load_face(rig))(0.4), atol=1e-3)
+
+
+def test_correctives_half_way_are_not_counted_twice(tmp_path):
+    rig = facegen.rig("cartoon", tmp_path / "cartoon.glb", sets=["arkit"], shapes=["eyeBlinkLeft", "jawOpen"])
+    assert rig.found.halves
+    take = Playback(recorded(("eyeBlinkLeft", "jawOpen")))
+    save_animation(take, tmp_path / "take.glb", face=rig.path)
+    back = read_gltf_performance(tmp_path / "take.glb")
+    assert set(back.names) == {"eyeBlinkLeft", "jawOpen"}
+    avatar = load_face(rig.path)
+    np.testing.assert_allclose(Playback(back).on(avatar)(0.35), take.on(avatar)(0.35), atol=1e-3)
+    shapes = facegen.load_avatar(tmp_path / "take.glb").shapes
+    assert set(shapes) > {"eyeBlinkLeft", "jawOpen"}
 
 
 def test_the_gaze_becomes_glances(tmp_path):
@@ -146,3 +168,22 @@ def test_a_head_alone(tmp_path, rig_file):
         assert np.abs(read_gltf_performance(tmp_path / "a.glb").head).max() == pytest.approx(30, abs=1e-3)
     save_clip(take, tmp_path / "frames", face="akimoto-1986", fps=2, size=32, detail=0, renderer="soft")
     assert len(list((tmp_path / "frames").glob("*.png"))) == 2
+
+
+def test_a_gltf_text_file_is_no_json_of_a_tracker(tmp_path, rig_file):
+    save_clip(recorded(("browDownLeft", "jawOpen")), tmp_path / "take.gltf", face=rig_file("arkit"))
+    back = facegen.load_performance(tmp_path / "take.gltf")
+    assert (back.about["format"], len(back)) == ("gltf", len(T))
+    assert back.column("browDownLeft").any()
+
+
+def test_the_door_to_recordings_writes_the_base_face(tmp_path):
+    weights = np.full((3, 2), 0.5)
+    weights[1] = np.nan
+    one = Performance([0.0, 0.1, 0.2], ("jawOpen", "cheekPuff"), weights, "arkit", head=HEAD[:3] * 3,
+                      place=np.zeros((3, 3)))
+    written = facegen.save_performance(one, tmp_path / "take.glb")
+    assert [one.partition(":")[0].partition(",")[0] for one in written.warnings] == [
+        "gltf has no place for place; not written", "1 of 3 frames have gaps",
+        "the head turns beyond reach in 3 frames (yaw 0..101 of -30..30"]
+    assert facegen.load_performance(tmp_path / "take.glb").column("cheekPuff").tolist() == [0.5] * 3
