@@ -240,7 +240,7 @@ class _AvatarDriver(Driver):
         shape = self.meaning.shapes.get(name)
         return None if shape is None else self._known.get(shape)
 
-    @property
+    @cached_property
     def _known(self) -> Mapping[str, str]:
         kind = self.meaning.vocabulary
         return {shape.removeprefix(CLASH) if kind == "expressions" else shape: name

@@ -3,7 +3,8 @@
 Between two frames everything goes in a straight line. Where a value was not recorded (NaN) between two that were, no
 more than ``bridge`` seconds apart, it goes straight from the one to the other; in a longer gap the face holds what was
 seen last and goes over to what comes in the last ``bridge`` seconds of the gap. Before the first and after the last
-value of a shape it holds; a shape without any stays at rest.
+value of a shape it holds; a shape without any stays at rest. Frames that are missing altogether, as where a tracker
+dropped them, are such a gap too; in a glTF file keys stand where their author wants them, so there they are none.
 
 The recorded gaze turns the eyes unless shapes of the recording do (ARKit's eyeLook, units 61 to 66); the same holds for
 the head and units 51 to 58. Where the head was in the room (``place``) is not shown: the camera stands still.
@@ -36,6 +37,8 @@ Array = NDArray[np.float64]
 BRIDGE = 0.5
 """Seconds of a gap that is bridged in a straight line: so long a blink or a hand before the face takes."""
 
+# A step between frames of so many usual ones is where frames are missing: no tracker hesitates that long.
+_DROPPED = 5.0
 # The length of a single frame, seconds.
 _MOMENT = 1 / 25
 # Rounding of a weight that is 0 or 1, and of degrees, by float32 and by turning them into rotations and back.
@@ -109,14 +112,27 @@ class Playback(Timed):
         one = self.performance
         return one.duration + (one.times[-1] - one.times[-2] if len(one) > 1 else _MOMENT)
 
-    @cached_property
+    @property
     def moments(self) -> Array:
-        """The times (n,) of the recording's own frames, seconds from the first."""
-        return self.performance.times - self.performance.times[0]
+        """The times (m,) of the recording's own frames, seconds from the first, and of ends of gaps without frames."""
+        return self._frames[0]
+
+    @cached_property
+    def _frames(self) -> tuple[Array, NDArray[np.intp]]:
+        """The moments, and which frame of the recording each is."""
+        times = self.performance.times - self.performance.times[0]
+        steps = np.diff(times)
+        if not len(steps) or self.performance.about.get("format") == "gltf":
+            return times, np.arange(len(times))
+        before = np.flatnonzero(steps > max(self.bridge, _DROPPED * float(np.median(steps))))
+        ends = (times[before + 1] - self.bridge).astype(np.float32)
+        ends = np.nextafter(ends, np.float32(0.0)).astype(np.float64)       # without a bridge: just before the jump
+        order = np.argsort(np.concatenate([times, ends]))
+        return np.concatenate([times, ends])[order], np.concatenate([np.arange(len(times)), before])[order]
 
     @cached_property
     def filled(self) -> Cue:
-        """All frames without gaps: ``weights`` (n, k), ``head`` (n, 3) and ``gaze`` (n, 4) or None."""
+        """All moments without gaps: ``weights`` (m, k), ``head`` (m, 3) and ``gaze`` (m, 4) or None."""
         one, meaning = self.performance, Meaning(self.performance.vocabulary, self.performance.names)
         recorded = np.isfinite(one.weights).any(axis=0)
         head = None if (recorded & meaning.columns("turns")).any() else one.head
@@ -181,8 +197,8 @@ class Playback(Timed):
         return (*driver.check(moving, head=self.filled.head is not None, gaze=self.filled.gaze is not None), *said)
 
     def _whole(self, values: Array) -> Array:
-        """Return values (n, k) without NaN."""
-        values = values.copy()
+        """Return values of the recording's frames (n, k) at the moments (m, k), without NaN."""
+        values = values[self._frames[1]]
         for column in np.flatnonzero(np.isnan(values).any(axis=0)):
             values[:, column] = bridged(self.moments, values[:, column], self.bridge)
         return values

@@ -54,6 +54,19 @@ def test_moments():
     assert Playback(recorded([0.4])).frames(25) == 1
 
 
+@pytest.mark.parametrize(("bridge", "start"), [(0.5, 2.5), (0.0, 3.0), (2.0, 1.0)])
+def test_frames_that_were_dropped_are_a_gap(bridge, start):
+    times = np.array([0, 0.1, 0.2, 0.3, 3.0, 3.1])
+    weights = np.array([[0, 0, 0, 0.2, 1.0, 1.0]]).T
+    play = Playback(facegen.Performance(times + 8, ("jawOpen",), weights, "arkit"), bridge)
+    assert play.cue(start - 1e-6).weights[0] == pytest.approx(0.2, abs=1e-4)
+    assert play.cue((start + 3.0) / 2).weights[0] == pytest.approx(0.6 if bridge else 1.0, abs=1e-4)
+    assert play.cue(0.25).weights[0] == pytest.approx(0.1)
+    keyed = Playback(facegen.Performance(times, ("jawOpen",), weights, "arkit", about={"format": "gltf"}), bridge)
+    assert keyed.cue(1.65).weights[0] == pytest.approx(0.6)
+    np.testing.assert_array_equal(keyed.moments, times)
+
+
 def test_shapes_go_before_angles():
     gaze, head = np.tile([5.0, 0, 5, 0], (2, 1)), np.tile([5.0, 0, 0], (2, 1))
     plain = Playback(recorded([0, 1], gaze=gaze, head=head)).cue(0.05)
