@@ -73,7 +73,7 @@ def test_what_was_changed_is_written_changed(load, tmp_path):
     assert list(again.extra["x_0"]) == list(one.extra["x_0"])
 
 
-@pytest.mark.parametrize("kind", FORMATS)
+@pytest.mark.parametrize("kind", [name for name, one in FORMATS.items() if one.write is not None])
 def test_a_performance_survives_each_format(kind, tmp_path):
     """What a format can hold comes back, with gaps, of a performance that was never in a file."""
     rng = np.random.default_rng(1)
