@@ -94,6 +94,8 @@ def shown(text: str) -> str:
 def head_of(path: Path, size: int = 65536) -> bytes:
     """Return the first bytes of a file; FileError if it cannot be read or there are none."""
     try:
+        if path.exists() and not path.is_file() and not path.is_dir():
+            raise FileError(f"{path}: is no file but a stream or a device; write it to a file first")
         with path.open("rb") as file:
             head = file.read(size)
     except FileNotFoundError:

@@ -154,6 +154,14 @@ def test_files_that_cannot_be_read(tmp_path, path, message):
         read_table(tmp_path / path)
 
 
+def test_a_stream_is_not_waited_for(tmp_path):
+    import os
+
+    os.mkfifo(tmp_path / "pipe")
+    with pytest.raises(FileError, match="is no file but a stream or a device"):
+        read_table(tmp_path / "pipe")
+
+
 def test_a_column_that_is_not_there_names_the_nearest(table):
     found = table("AU01_r,name\n1,x\n")
     with pytest.raises(FileError, match=r"no column 'AU01_s'; did you mean 'AU01_r'\?"):

@@ -93,14 +93,15 @@ def read_json(path: Path, wish: Wish) -> Performance:
 
 
 def write_json(one: Performance, path: Path) -> None:
-    """Write ARKit's shapes as a list of results with their times in milliseconds, one a line."""
+    """Write ARKit's shapes as results with their times in milliseconds, one a line; in a list unless it is .jsonl."""
     before = tabular.original(one, NAME)
     neutral = before.get(NEUTRAL)
     names = [NEUTRAL, *sorted(one.names)] if neutral is not None else sorted(one.names)
     columns = [neutral if name == NEUTRAL else one.column(name) for name in names]
     values = np.column_stack(columns) if columns else np.empty((len(one), 0))
     with whole_file(path) as draft, draft.open("w", encoding="utf-8", newline="\n") as file:
-        file.write('{"frames": [\n')
+        listed = path.suffix.lower() == ".json"
+        file.write('{"frames": [\n' if listed else "")
         for k, (time, row) in enumerate(zip(one.times.tolist(), values.tolist(), strict=True)):
             categories = [{"index": i, "categoryName": name, "score": round(score, 12)}
                           for i, (name, score) in enumerate(zip(names, row, strict=True)) if score == score]
@@ -108,8 +109,8 @@ def write_json(one: Performance, path: Path) -> None:
                                       "faceBlendshapes": [{"categories": categories}] if categories else []}
             if one.head is not None and np.isfinite(one.head[k]).all():
                 result["facialTransformationMatrixes"] = [_as_matrix(one, k)]
-            file.write(json.dumps(result) + (",\n" if k < len(one) - 1 else "\n"))
-        file.write("]}\n")
+            file.write(json.dumps(result) + (",\n" if listed and k < len(one) - 1 else "\n"))
+        file.write("]}\n" if listed else "")
 
 
 def read_csv(path: Path, wish: Wish) -> Performance:

@@ -102,6 +102,31 @@ def test_a_performance_survives_each_format(kind, tmp_path):
             assert any(part in warning for warning in written.warnings)
 
 
+def test_json_with_one_result_a_line(load, tmp_path):
+    one = load(livelink(5))
+    save_performance(one, tmp_path / "a.jsonl")
+    assert len((tmp_path / "a.jsonl").read_text().splitlines()) == 5
+    np.testing.assert_array_equal(load_performance(tmp_path / "a.jsonl").weights, one.weights)
+
+
+NUMBER = st.floats(-1e6, 1e6, allow_subnormal=False)
+
+
+@given(st.lists(st.tuples(st.floats(0.001, 10.0), *[NUMBER | st.just(float("nan"))] * 5), min_size=1, max_size=12),
+       st.sampled_from([("1", "L12"), ("jawOpen", "mouthClose"), ("viseme_aa", "viseme_O"), ("happy", "lookUp")]))
+@settings(deadline=None, max_examples=60)
+def test_our_own_csv_holds_every_bit(tmp_path_factory, rows, names):
+    table = np.array(rows)
+    kind = {"1": "units", "jawOpen": "arkit", "viseme_aa": "visemes", "happy": "vrm"}[names[0]]
+    one = Performance(np.cumsum(table[:, 0]), names, np.round(table[:, 1:3], 9), kind, head=np.round(table[:, 3:], 9))
+    path = tmp_path_factory.getbasetemp() / "own.csv"
+    save_performance(one, path, format="csv")
+    again = load_performance(path)
+    assert (again.names, again.vocabulary) == (one.names, one.vocabulary)
+    for part in ("times", "weights", "head"):
+        np.testing.assert_array_equal(getattr(again, part), getattr(one, part))
+
+
 def test_sides_that_a_format_cannot_tell_are_said(tmp_path):
     one = Performance([0.0, 0.1], ("L12", "R12", "R14", "L30", "23"), [[0.5, 0.3, 0.2, 1, 0.4]] * 2, "units")
     written = save_performance(one, tmp_path / "x.csv", format="openface")
