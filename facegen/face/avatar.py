@@ -101,7 +101,15 @@ class AvatarFace:
         vertices = np.asarray(vertices, np.float64)
         if vertices.shape != self._mesh.vertices.shape:
             raise InputError(f"vertices: expected shape {self._mesh.vertices.shape}, got {vertices.shape}")
-        return dict(zip(self.landmarks, self._landmark_weights @ vertices, strict=True))
+        return dict(zip(self.landmarks, self.landmark_weights() @ vertices, strict=True))
+
+    def landmark_weights(self) -> sparse.csr_array:
+        """Return the weights (k, n) of the vertices of ``mesh()`` that place the landmarks; kept."""
+        return self._landmarks_on
+
+    def head_share(self) -> Array:
+        """Return how much of the head's turn each vertex (n,) makes."""
+        return self._neck_weight[:, 0]
 
     @cached_property
     def known(self) -> dict[str, tuple[str, Recipe]]:
@@ -160,7 +168,7 @@ class AvatarFace:
         for name in self.shapes:
             weight = weights.get(name, 0.0) + halves.get(name, 0.0)
             if weight:
-                rows, moves = self._moved(name)
+                rows, moves = self.moved(name)
                 vertices[rows] += weight * moves
         return vertices
 
@@ -199,7 +207,7 @@ class AvatarFace:
                 raise InputError(f"face: none of the {len(self.shapes)} blendshapes of {self.path.name} has a name "
                                  "that is understood (units such as AU12_L, ARKit, visemes, VRM, expressions); "
                                  "rename them, or rig the neutral: facegen rig")
-            fitted, lost = self._made_of.fitted(_held(members), raw_movement(raw) if raw else None)
+            fitted, lost = self._made_of.fitted(held(members), raw_movement(raw) if raw else None)
             if len(self._fitted) >= _KEPT:
                 self._fitted.clear()
             self._fitted[key] = self._by_name(fitted), lost
@@ -217,7 +225,7 @@ class AvatarFace:
         # A corrective without the shape that it corrects means nothing.
         return Shapes({shape: one for shape, one in recipes.items() if one.minus is None or one.minus in recipes})
 
-    def _moved(self, name: str) -> tuple[NDArray[np.int64], Array]:
+    def moved(self, name: str) -> tuple[NDArray[np.int64], Array]:
         """Return the vertices that a shape moves and how (k, 3), mm; kept."""
         if name not in self._moves:
             moves = np.asarray(self._file.shapes[name], np.float64)
@@ -226,10 +234,10 @@ class AvatarFace:
         return self._moves[name]
 
     @cached_property
-    def _landmark_weights(self) -> sparse.csr_array:
-        return placing(self.notes, self._mesh, self._opened)
+    def _landmarks_on(self) -> sparse.csr_array:
+        return placing(self.notes, self._mesh, self.opened)
 
-    def _opened(self) -> Array | None:
+    def opened(self) -> Array | None:
         """Return how the vertices move when the jaw opens, mm, or None if no shape does that."""
         weights, left = self._made_of.read_off({_WIDEST: 1.0}) if self.known else ({}, {_WIDEST: 1.0})
         if left:
@@ -291,7 +299,7 @@ def _closures() -> dict[str, tuple[float, float]]:
     return found
 
 
-def _held(members: Mapping[str, float]) -> dict[str, float]:
+def held(members: Mapping[str, float]) -> dict[str, float]:
     """Return coefficients that close no eye twice: lids that meet stop, blendshapes would go on through each other."""
     held = dict(members)
     for side in (0, 1):

@@ -6,7 +6,7 @@ no code. A face is a rig: ``pose(what)`` gives vertices, ``mesh(detail)`` what t
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from functools import cache, cached_property, lru_cache
 from pathlib import Path
@@ -18,7 +18,7 @@ from scipy import sparse
 
 from facegen.data import meshes_dir
 from facegen.errors import InputError, nearest
-from facegen.face.attach import attach
+from facegen.face.attach import Attachment, attach
 from facegen.face.deformer import Array, Deformer
 from facegen.face.eye import eyeball_radius
 from facegen.face.folds import fold_field
@@ -69,13 +69,30 @@ class Controls:
 
 @dataclass(frozen=True, eq=False)
 class _Level:
-    """What is constant at one level of detail."""
+    """What is constant at one level of detail, or of some of its vertices."""
 
     matrix: sparse.csr_array            # surface vertices from cage vertices
-    mesh: Mesh                          # neutral, all parts
+    neutral: Array                      # (n, 3), all parts
     lid_vertices: tuple[NDArray[np.int64], ...]
     folds: Array                        # (f, n_surface, 3) displacement at amount one
     head_weight: Array                  # (n, 1)
+    attachments: tuple[Attachment, ...]
+
+    def some(self, vertices: NDArray[np.int64]) -> _Level:
+        """Return the same for some vertices alone, ascending."""
+        n = self.matrix.shape[0]
+        skin = vertices[vertices < n]
+        places = np.full(n, -1)
+        places[skin] = np.arange(len(skin))
+        lids = tuple(found[found >= 0] for found in (places[rows] for rows in self.lid_vertices))
+        parts = []
+        for a in self.attachments:
+            size = len(a.mesh.vertices)
+            rows = vertices[(vertices >= n) & (vertices < n + size)] - n
+            parts += [a.some(rows)] if len(rows) else []
+            n += size
+        return _Level(self.matrix[skin], self.neutral[vertices], lids, self.folds[:, skin], self.head_weight[vertices],
+                      tuple(parts))
 
 
 class Face:
@@ -86,6 +103,7 @@ class Face:
         self.name = data.name
         self.deformer: Deformer = data.deformer
         self._levels: dict[int, _Level] = {}
+        self._meshes: dict[int, Mesh] = {}
         self._points_on: dict[int, sparse.csr_array] = {}       # worked out when asked for, by detail
         self._landmarks_on: dict[int, sparse.csr_array] = {}
 
@@ -142,7 +160,8 @@ class Face:
 
     def mesh(self, detail: int = 2) -> Mesh:
         """Return the neutral face at a subdivision level, 0 (the cage's own triangles) to 3."""
-        return self._level(detail).mesh
+        self._level(detail)
+        return self._meshes[detail]
 
     # -- poses --------------------------------------------------------------------------------------------------
     def pose(self, what: Any = "neutral", *, person: Any = None, intensity: float = 1.0, detail: int = 2) -> Array:
@@ -198,10 +217,7 @@ class Face:
                 vectors[row] += self.deformer.jaw.movement(self.deformer.points[[row]], jaw_state)[0]
         eyes = np.array([deformation.eyes.get(k, 0.0) for k in ("yaw_L", "pitch_L", "yaw_R", "pitch_R")])
         lids = np.array([deformation.lids.get(k, 0.0) for k in ("upper_L", "lower_L", "upper_R", "lower_R")])
-        for i, pitch in enumerate(eyes[[1, 3]]):            # lids follow the gaze as far as they are open
-            pair = slice(2 * i, 2 * i + 2)
-            openness = 1.0 - np.clip(lids[pair].sum(), 0.0, 1.0)
-            lids[pair] += d.lid_follow[int(pitch > 0)] * abs(pitch) * openness
+        lids = self.following_lids(lids, eyes)
         head = np.array([*(deformation.head.get(k, 0.0) for k in ("yaw", "pitch", "roll")),
                          deformation.head.get("forward", 0.0) * mouth[2]])
         for name in deformation.folds:
@@ -213,10 +229,18 @@ class Face:
 
     def pose_controls(self, controls: Controls, *, detail: int = 2) -> Array:
         """Return vertices (..., n, 3), mm, of ``mesh(detail)`` for (a batch of) controls."""
-        d, level = self._data, self._level(detail)
-        batch = controls.vectors.shape[:-2]
+        return self._posed(self._level(detail), controls)
+
+    def some_posed(self, vertices: NDArray[np.int64], *, detail: int = 2) -> Callable[[Controls], Array]:
+        """Return what `pose_controls` would give for some vertices (k,) of ``mesh(detail)``, ascending: a function of
+        controls, made once, that costs what they cost."""
+        level = self._level(detail).some(np.asarray(vertices))
+        return lambda controls: self._posed(level, controls)
+
+    def _posed(self, level: _Level, controls: Controls) -> Array:
+        d, batch = self._data, controls.vectors.shape[:-2]
         if not any(np.any(part) for part in vars(controls).values()):
-            return np.broadcast_to(level.mesh.vertices, (*batch, *level.mesh.vertices.shape)).copy()
+            return np.broadcast_to(level.neutral, (*batch, *level.neutral.shape)).copy()
         cage = self.deformer.deform(controls.vectors, controls.jaw, controls.lids)
         flat = np.moveaxis(cage.reshape(-1, *cage.shape[-2:]), 0, 1).reshape(cage.shape[-2], -1)
         skin = np.moveaxis((level.matrix @ flat).reshape(level.matrix.shape[0], -1, 3), 1, 0)
@@ -225,12 +249,18 @@ class Face:
             skin += np.einsum("...f,fni->...ni", controls.folds, level.folds)
         for i, (centre, rows) in enumerate(zip(d.eye_centres, level.lid_vertices, strict=True)):
             self._rest_on_eyeball(skin, rows, centre, controls.eyes[..., 2 * i: 2 * i + 2])
-        pieces = [skin]
         moved_cage = cage - self.deformer.neutral
-        for a in d.attachments:
-            pieces.append(a.move(moved_cage, controls, self.deformer))
-        vertices = np.concatenate(pieces, axis=-2)
-        return turn_head(vertices, controls.head, d.head_pivot, level.head_weight)
+        pieces = [skin, *(a.move(moved_cage, controls, self.deformer) for a in level.attachments)]
+        return turn_head(np.concatenate(pieces, axis=-2), controls.head, d.head_pivot, level.head_weight)
+
+    def following_lids(self, lids: Array, eyes: Array) -> Array:
+        """Return the lids' travel (..., 4) under a gaze (..., 4): they follow it up and down as far as they are open."""
+        lids = np.array(lids, np.float64)
+        for i in range(2):
+            pair, pitch = lids[..., 2 * i: 2 * i + 2], eyes[..., 2 * i + 1, None]
+            openness = 1.0 - np.clip(pair.sum(axis=-1, keepdims=True), 0.0, 1.0)
+            pair += np.where(pitch > 0, self._data.lid_follow[1], self._data.lid_follow[0]) * np.abs(pitch) * openness
+        return lids
 
     def _lengths(self, units: str) -> tuple[Array, Array]:
         """Return the millimetres of a unit of length: at each feature point (k, 3), and of the jaw and head (3,)."""
@@ -323,7 +353,12 @@ class Face:
         mesh = merge([skin, *(a.mesh for a in d.attachments)])
         normals = vertex_normals(neutral, faces)
         folds = np.array([fold_field(f, neutral, normals) for f in d.folds.values()]).reshape(len(d.folds), n, 3)
-        return _Level(matrix, mesh, tuple(lids), folds, d.head_weight(mesh.vertices))
+        self._meshes[detail] = mesh
+        return _Level(matrix, mesh.vertices, tuple(lids), folds, d.head_weight(mesh.vertices), tuple(d.attachments))
+
+    def head_share(self, detail: int = 2) -> Array:
+        """Return how much of the head's turn each vertex (n,) of ``mesh(detail)`` makes."""
+        return self._level(detail).head_weight[:, 0]
 
     def landmark_weights(self, detail: int = 2) -> sparse.csr_array:
         """Return the weights (k, n) of the vertices of ``mesh(detail)`` that place the landmarks; kept."""
