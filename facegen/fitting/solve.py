@@ -30,7 +30,7 @@ _OUTLIER = 3.0
 _MEDIAN = {2: 1.1774, 3: 1.5382}
 # Because steps shrink fast, the one after a step of so many weights, radians or tenths of a metre is not seen, nor
 # is a change of E by less than this share.
-_SHORT, _STILL = 1e-3, 1e-6
+_SHORT, _STILL = 3e-3, 1e-6
 _HALVINGS = 8
 # What counts in a step as much as a whole weight: a radian, a tenth of a metre, the zoom's logarithm.
 _LENGTHS = np.array([1.0, 1.0, 1.0, 100.0, 100.0, 100.0, 1.0, 1.0])
