@@ -33,6 +33,9 @@ if TYPE_CHECKING:
     from facegen.fileio.avatar import AvatarFile, load_avatar, save_avatar
     from facegen.fileio.images import contact_sheet, save_image
     from facegen.fileio.video import save_video
+    from facegen.fitting.files import fit_files
+    from facegen.fitting.fit import Fitted, fit_landmarks, fit_markers, fit_meshes
+    from facegen.fitting.views import Pinhole, WeakCamera
     from facegen.geometry.mesh import Mesh
     from facegen.jobs.batch import run_batch
     from facegen.jobs.frames import save_clip, save_turn
@@ -52,21 +55,28 @@ __all__ = [
     "Face",
     "FacegenError",
     "FileError",
+    "Fitted",
     "InputError",
     "JobError",
     "Mesh",
     "NotationError",
     "Performance",
+    "Pinhole",
     "Recipe",
     "Renderer",
     "Resolution",
     "TableError",
+    "WeakCamera",
     "Wireframe",
     "avatar_names",
     "canonical",
     "contact_sheet",
     "convert",
     "face_names",
+    "fit_files",
+    "fit_landmarks",
+    "fit_markers",
+    "fit_meshes",
     "load_avatar",
     "load_clip",
     "load_deformation",
@@ -110,6 +120,9 @@ _HOMES = {
     "facegen.fileio.avatar": ("AvatarFile", "load_avatar", "save_avatar"),
     "facegen.fileio.images": ("contact_sheet", "save_image"),
     "facegen.fileio.video": ("save_video",),
+    "facegen.fitting.files": ("fit_files",),
+    "facegen.fitting.fit": ("Fitted", "fit_landmarks", "fit_markers", "fit_meshes"),
+    "facegen.fitting.views": ("Pinhole", "WeakCamera"),
     "facegen.geometry.mesh": ("Mesh",),
     "facegen.jobs.batch": ("run_batch",),
     "facegen.jobs.frames": ("save_clip", "save_turn"),

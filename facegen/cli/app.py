@@ -12,6 +12,7 @@ import typer
 
 from facegen import __version__
 from facegen.cli import batch, explain, figures, film, gallery, listing, picture
+from facegen.cli import fit as fitting
 from facegen.cli import rig as rigging
 from facegen.errors import FacegenError, InputError
 
@@ -33,6 +34,7 @@ app.command("animate")(film.animate)
 app.command("morph")(film.morph)
 app.command("turntable")(film.turntable)
 app.command("rig")(rigging.rig)
+app.command("fit")(fitting.fit)
 
 
 def _version(asked: bool) -> None:

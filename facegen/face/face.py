@@ -254,7 +254,7 @@ class Face:
         return turn_head(np.concatenate(pieces, axis=-2), controls.head, d.head_pivot, level.head_weight)
 
     def following_lids(self, lids: Array, eyes: Array) -> Array:
-        """Return the lids' travel (..., 4) under a gaze (..., 4): they follow it up and down as far as they are open."""
+        """Return the lids' travel (..., 4) under a gaze (..., 4): they follow it up and down while open."""
         lids = np.array(lids, np.float64)
         for i in range(2):
             pair, pitch = lids[..., 2 * i: 2 * i + 2], eyes[..., 2 * i + 1, None]

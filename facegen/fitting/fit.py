@@ -3,24 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import sparse
 
-from facegen.animation.performance import Performance
 from facegen.errors import InputError
 from facegen.face.face import Face
-from facegen.fitting.head_pose import angles
 from facegen.fitting.layouts import layout_rows, load_layout
-from facegen.fitting.observed import Observed, observed
+from facegen.fitting.observed import observed
 from facegen.fitting.places import marker_rows
 from facegen.fitting.rigs import Rig, Wanted, rig_points, wanted
-from facegen.fitting.sequence import COUNTED, Track, Tracker, distances, residual, track
+from facegen.fitting.results import Fitted, told
+from facegen.fitting.sequence import Tracker, track
 from facegen.fitting.solve import Rules
-from facegen.fitting.units import FacePoints
 from facegen.fitting.views import Camera, Pinhole, Space, View, WeakCamera
 
 Array = NDArray[np.float64]
@@ -28,31 +25,10 @@ Array = NDArray[np.float64]
 MESH_NOISE, MARKER_NOISE, PICTURE_NOISE = 0.1, 0.5, 1.0
 """Noise that is assumed if none is given: millimetres of meshes and of markers, pixels of landmarks."""
 
-# A mean residual of more than this many times the noise is worth a word.
-_POOR = 4.0
 # Of an avatar's vertices that a mesh is fitted by, this many are enough for any noise.
 _MOST_VERTICES = 20_000
 # Vertices that make less than this of the head's turn are of the neck.
 _OF_HEAD = 0.999
-
-
-@dataclass(frozen=True, eq=False)
-class Fitted:
-    """What a fit found, of n frames and p points.
-
-    performance: weights, NaN in frames without a fit and for weights that no point sees; head, place, gaze. residuals
-    (n,): root of the mean square distance in ``unit``, "mm" of the rig's or "px"; outliers left out. points: (n, p, 2
-    or 3), where the fit sees the points, in the measurement's own units; ``outliers`` (n, p). scale (n,): measured
-    units (or pixels) in a millimetre of the rig's; NaN for a camera with perspective. seen: what the points tell.
-    """
-
-    performance: Performance
-    residuals: Array
-    unit: str
-    points: Array
-    outliers: NDArray[np.bool_]
-    scale: Array
-    seen: Observed
 
 
 def fit_meshes(face: Rig, vertices: ArrayLike, *, times: ArrayLike | None = None, fps: float = 25.0,
@@ -69,12 +45,12 @@ def fit_meshes(face: Rig, vertices: ArrayLike, *, times: ArrayLike | None = None
 
     Raises InputError for vertices of another mesh. ::
 
-        fit_meshes(face, [face.pose("happiness")]).performance.frame(0)      # {"AU6_L": 0.8, ...}
+        fit_meshes(face, [face.pose("happiness")]).performance.frame(0)      # {"L6": 0.8, "R6": 0.8, ...}
     """
     mesh, goals = face.mesh(), _frames("vertices", vertices, 3)
     if goals.shape[1] != len(mesh.vertices):
-        raise InputError(f"vertices: expected {len(mesh.vertices)}, as '{face.name}' has, got {goals.shape[1]}: another "
-                         "mesh, or a tool that merged or split vertices; place markers on it instead")
+        raise InputError(f"vertices: expected {len(mesh.vertices)}, as '{face.name}' has, got {goals.shape[1]}: "
+                         "another mesh, or a tool that merged or split vertices; place markers on it instead")
     rows = _mesh_rows(face)
     place = sparse.csr_array((np.ones(len(rows)), (np.arange(len(rows)), rows)), shape=(len(rows), len(mesh.vertices)))
     rules = _rules(noise, sparsity, change, robust)
@@ -106,23 +82,29 @@ def fit_markers(face: Rig, positions: ArrayLike, markers: Sequence[str] | Mappin
 
 def fit_landmarks(face: Rig, landmarks: ArrayLike, layout: str | Mapping[str, Any], *, camera: Camera | None = None,
                   times: ArrayLike | None = None, fps: float = 25.0, shapes: str | Sequence[str] | None = None,
-                  neutral: Sequence[int] = (), noise: float = PICTURE_NOISE, sparsity: float = Rules.sparsity,
-                  change: float = Rules.change, robust: bool = False) -> Fitted:
+                  neutral: Sequence[int] = (), scale: float | None = None, noise: float | None = None,
+                  sparsity: float = Rules.sparsity, change: float = Rules.change, robust: bool = False) -> Fitted:
     """Return the weights and the pose that show a rig's landmarks where they are in pictures.
 
     landmarks: (n, p, 2) or (p, 2) pixels, x to the right and y down, NaN where missing; of a layout all its points, in
-        its order. layout: "ibug68", "mediapipe478", or markers as in `fit_markers`. camera: a `Pinhole`, or None for
-        weak perspective, which leaves the distance open. noise: pixels. All else as in `fit_meshes`.
+        its order. With three numbers they are places in space (y up), of any unit and frame, and take no camera.
+    layout: "ibug68", "mediapipe478", or markers as in `fit_markers`. camera: a `Pinhole`, or None for weak perspective,
+        which leaves the distance open. noise: pixels, or mm. All else as in `fit_meshes`.
 
     Raises InputError. ::
 
         fit_landmarks(face, found, "ibug68", camera=Pinhole.of_view(60, (1280, 720)))
     """
-    goals = _frames("landmarks", landmarks, 2)
+    solid = np.ndim(landmarks) in (2, 3) and np.shape(landmarks)[-1] == 3
+    if solid and camera is not None:
+        raise InputError("camera: landmarks of three numbers are places in space and take none; give x and y alone")
+    if scale is not None and not solid:
+        raise InputError("scale: only places in space have one; a picture's follows from the camera")
+    goals = _frames("landmarks", landmarks, 3 if solid else 2)
     place, share, indices = layout_points(face, layout, goals.shape[1])
-    rules = _rules(noise, sparsity, change, robust)
-    return _fitted(face, place, share, goals[:, indices], _camera(camera), wanted(face, shapes), rules, times, fps,
-                   neutral, None, layout if isinstance(layout, str) else "landmarks")
+    rules = _rules((MARKER_NOISE if solid else PICTURE_NOISE) if noise is None else noise, sparsity, change, robust)
+    return _fitted(face, place, share, goals[:, indices], Space() if solid else _camera(camera), wanted(face, shapes),
+                   rules, times, fps, neutral, scale, layout if isinstance(layout, str) else "landmarks")
 
 
 def landmark_tracker(face: Rig, layout: str | Mapping[str, Any], *, camera: Camera | None = None,
@@ -193,74 +175,7 @@ def _fitted(face: Rig, place: sparse.csr_array, share: Array, goals: Array, view
         raise InputError(f"{source}: no frame has points enough for a pose: {4 if view.size == 2 else 3} or more that "
                          "are not on a line")
     seen = observed(found.points, found.view, first.pose, np.where(valid.any(axis=0), share, 0.0), rules.noise)
-    return _told(face, found, goals, share, want, seen, stamps, rules, source)
-
-
-def _told(face: Rig, found: Track, goals: Array, share: Array, want: Wanted, seen: Observed, times: Array, rules: Rules,
-          source: str) -> Fitted:
-    """Return frames' states as a performance."""
-    n, p, points, view = len(goals), goals.shape[1], found.points, found.view
-    weights, head, place = np.full((n, len(want.names)), np.nan), np.full((n, 3), np.nan), np.full((n, 3), np.nan)
-    gaze = np.full((n, 4), np.nan) if isinstance(points, FacePoints) and points.gaze(points.low) is not None else None
-    off, scale, made = np.full(n, np.nan), np.full(n, np.nan), np.full(goals.shape, np.nan)
-    outliers, count = np.zeros((n, p), bool), np.zeros(n)
-    flat = isinstance(view, WeakCamera)
-    hidden = np.isin(want.names, seen.unseen)
-    for k, state in enumerate(found.states):
-        if state is None:
-            continue
-        weights[k] = np.where(hidden, np.nan, points.weights(state.x))
-        head[k], place[k] = angles(state.pose.turn), state.pose.place
-        if gaze is not None:
-            gaze[k] = points.gaze(state.x)
-        valid = np.where(np.isfinite(goals[k]).all(axis=1), share, 0.0)
-        off[k] = residual(points, view, np.nan_to_num(goals[k]), state, valid)
-        made[k] = view.project(state.pose.apply(points.places(state.x)), state.pose.zoom)
-        outliers[k], count[k] = (valid > 0.0) & (state.counted < COUNTED), (valid > 0.0).sum()
-        scale[k] = np.nan if isinstance(view, Pinhole) else state.pose.zoom
-    if flat:
-        place[:, 2] = np.nan
-    if gaze is not None and not _sees_eyes(points, goals):
-        gaze = None
-    extra = {f"residual_{view.unit}": off, "points": count}
-    if rules.robust:
-        extra["outliers"] = outliers.sum(axis=1).astype(float)
-    about = {"format": "facegen fit", "rig": face.name, "of": source, "camera": type(view).__name__}
-    performance = Performance(times, want.names, weights, want.vocabulary, head, place, gaze, extra, about,
-                              _warnings(found, seen, off, view, rules, flat))
-    return Fitted(performance, off, view.unit, made, outliers, scale, seen)
-
-
-def _sees_eyes(points: FacePoints, goals: Array) -> bool:
-    """Return whether a point was seen that a turn of the eyes moves by a millimetre or more."""
-    x = np.clip(np.zeros(len(points.low)), points.low, points.high)
-    turned = x.copy()
-    turned[len(points.names)] = 10.0
-    moved = np.linalg.norm(points.places(turned) - points.places(x), axis=1) > 1.0
-    return bool(np.isfinite(goals).all(axis=2).any(axis=0)[moved].any())
-
-
-def _warnings(found: Track, seen: Observed, off: Array, view: View, rules: Rules, flat: bool) -> tuple[str, ...]:
-    said = []
-    lost = [k for k, state in enumerate(found.states) if state is None]
-    if lost:
-        said.append(f"{len(lost)} of {len(off)} frames have too few points and stay empty, the first is {lost[0]}")
-    if seen.unseen:
-        said.append(f"no point sees {_listed(seen.unseen)}: not fitted")
-    if seen.unsure:
-        said.append("one frame says little of " + _listed([f"{name} (for {other})" for name, other in
-                                                           seen.unsure.items()]))
-    if flat:
-        said.append("weak perspective does not tell how far away the head is: z of its place is empty")
-    typical = float(np.nanmedian(off))
-    if typical > _POOR * rules.noise:
-        said.append(f"the points stay {typical:.3g} {view.unit} from the rig's: another person's face or other places; "
-                    "name frames in which they rest (neutral), or a larger noise")
-    return tuple(said)
-
-
-def _listed(names: Sequence[str], most: int = 8) -> str:
-    return ", ".join(names[:most]) + (f" and {len(names) - most} more" if len(names) > most else "")
+    return told(face, found, goals, share, want, seen, stamps, rules, source)
 
 
 def _camera(camera: Camera | None) -> View:

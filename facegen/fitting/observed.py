@@ -22,6 +22,8 @@ Array = NDArray[np.float64]
 _SEEN = 1.0
 # Deviation of a weight that may be anything from 0 to 1.
 _ANY = 1.0 / np.sqrt(12.0)
+# Of an angle before it is measured, degrees; and next to nothing, for a pose.
+_ANGLE, _NONE = 20.0, 1e-9
 # A weight of which the points leave more than this share of that deviation is not determined by a frame.
 _UNSURE = 0.6
 
@@ -52,7 +54,8 @@ def observed(points: Points, view: View, pose: HeadPose, share: Array, noise: fl
     posed = np.concatenate([by_place @ spin, by_place, by_zoom[:, :, None] * view.zooms], axis=2)
     both = np.concatenate([posed, moved], axis=2) * np.sqrt(share)[:, None, None]
     flat = both.reshape(-1, both.shape[2]) / unit
-    prior = np.concatenate([np.full(7, 1e-9), np.full(count, 1.0 / _ANY**2), np.full(moved.shape[2] - count, 1.0 / 400.0)])
+    prior = np.full(both.shape[2], 1.0 / _ANGLE**2)
+    prior[:7], prior[7:7 + count] = _NONE, 1.0 / _ANY**2
     spread = np.linalg.inv(flat.T @ flat + np.diag(prior))[7:7 + count, 7:7 + count]
     deviation = np.sqrt(np.diagonal(spread))
     alike = np.abs(spread) / np.outer(deviation, deviation)

@@ -44,8 +44,8 @@ def wanted(face: Rig, shapes: str | Sequence[str] | None = None) -> Wanted:
     """
     if isinstance(face, Face):
         if isinstance(shapes, str) and shapes != "units":
-            raise InputError(f"shapes: the parametric face '{face.name}' has no blendshapes, only units, got {shapes!r}; "
-                             "make an avatar of it or leave this out")
+            raise InputError(f"shapes: the parametric face '{face.name}' has no blendshapes, only units, got {shapes!r}"
+                             "; make an avatar of it or leave this out")
         atoms = unit_atoms(None if shapes is None or isinstance(shapes, str) else shapes)
         return _units(atoms)
     by_set: dict[str, dict[str, str]] = {}                  # set -> shape -> the file's name of it
@@ -103,11 +103,9 @@ def rig_points(face: Rig, place: sparse.csr_array, want: Wanted, *, detail: int 
 
 
 def _units(atoms: tuple[str, ...]) -> Wanted:
-    from facegen.blendshapes.names import shape_of
-
     if not atoms:
         raise InputError("shapes: expected one unit or more, got none")
-    return Wanted("units", tuple(map(shape_of, atoms)), atoms)
+    return Wanted("units", atoms, atoms)
 
 
 def _named(face: AvatarFace, names: list[str]) -> Wanted:
@@ -115,7 +113,8 @@ def _named(face: AvatarFace, names: list[str]) -> Wanted:
     mine = {shape: name for name, (shape, _) in face.known.items()}
     for name in names:
         if name not in face.shapes and name not in mine:
-            raise InputError(f"shapes: {face.path.name} has no shape '{name}'{nearest(str(name), (*face.shapes, *mine))}")
+            raise InputError(f"shapes: {face.path.name} has no shape '{name}'"
+                             f"{nearest(str(name), (*face.shapes, *mine))}")
     columns = tuple(dict.fromkeys(name if name in face.shapes else mine[name] for name in names))
     if not columns:
         raise InputError("shapes: expected one name or more, got none")

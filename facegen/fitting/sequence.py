@@ -76,15 +76,11 @@ def enough(goal: Array, share: Array) -> bool:
 
 def residual(points: Points, view: View, goal: Array, state: State, share: Array) -> float:
     """Return the root of the mean square distance of the points that count: millimetres of the rig's, or pixels."""
-    far = distances(points, view, goal, state)
-    counts = (share > 0.0) & (state.counted >= COUNTED)
-    return float(np.sqrt(np.mean(far[counts] ** 2))) if counts.any() else float("nan")
-
-
-def distances(points: Points, view: View, goal: Array, state: State) -> Array:
-    """Return how far (p,) each point is from its measurement, millimetres of the rig's or pixels."""
     off = view.project(state.pose.apply(points.places(state.x)), state.pose.zoom) - goal
-    return np.sqrt((off**2).sum(axis=1)) / (state.pose.zoom if isinstance(view, Space) else 1.0)
+    counts = (share > 0.0) & (state.counted >= COUNTED)
+    if not counts.any():
+        return float("nan")
+    return float(np.sqrt((off[counts] ** 2).sum(axis=1).mean())) / (state.pose.zoom if isinstance(view, Space) else 1.0)
 
 
 def head_scale(points: Points, goals: Array, share: Array, rules: Rules) -> float:

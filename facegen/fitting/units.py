@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from facegen.animation.angles import reach
-from facegen.blendshapes.names import member_of, shape_of
+from facegen.blendshapes.names import member_of
 from facegen.blendshapes.recipes import is_head
 from facegen.face.avatar import held
 from facegen.face.face import DEEPEST_FOLD, Controls, Face
@@ -81,7 +81,7 @@ class FacePoints:
     def __init__(self, face: Face, place: sparse.csr_array, atoms: Sequence[str], *, detail: int = 2,
                  gaze: bool = True, offset: Array | None = None) -> None:
         self.face, self.atoms, self.detail = face, tuple(atoms), detail
-        self.names = tuple(shape_of(atom) for atom in atoms)
+        self.names = tuple(atoms)
         count = len(GAZE) if gaze else 0
         self.low = np.concatenate([np.zeros(len(atoms)), [-_WIDEST, -_WIDEST, -_CROSSED][:count]])
         self.high = np.concatenate([np.ones(len(atoms)), [_WIDEST, _WIDEST, _CROSSED][:count]])
