@@ -14,8 +14,8 @@ from facegen.face.face import Face
 from facegen.fitting.layouts import layout_rows, load_layout
 from facegen.fitting.observed import observed
 from facegen.fitting.places import marker_rows
-from facegen.fitting.rigs import Rig, Wanted, rig_points, wanted
 from facegen.fitting.results import Fitted, told
+from facegen.fitting.rigs import Rig, Wanted, rig_points, wanted
 from facegen.fitting.sequence import Tracker, track
 from facegen.fitting.solve import Rules
 from facegen.fitting.views import Camera, Pinhole, Space, View, WeakCamera

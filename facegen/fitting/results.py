@@ -109,7 +109,7 @@ def _warnings(found: Track, seen: Observed, off: Array, view: View, rules: Rules
     if lost:
         said.append(f"{len(lost)} of {len(off)} frames have too few points and stay empty, the first is {lost[0]}")
     if seen.unseen:
-        said.append(f"no point sees {_listed(seen.unseen)}: not fitted")
+        said.append(f"no point sees {', '.join(seen.unseen)}: not fitted")
     if seen.unsure:
         said.append("one frame says little of " + _listed([f"{name} (for {other})" for name, other in
                                                            seen.unsure.items()]))

@@ -43,22 +43,18 @@ def wanted(face: Rig, shapes: str | Sequence[str] | None = None) -> Wanted:
     Raises InputError.
     """
     if isinstance(face, Face):
-        if isinstance(shapes, str) and shapes != "units":
+        if isinstance(shapes, str) and shapes in (*SETS, "shapes") and shapes != "units":
             raise InputError(f"shapes: the parametric face '{face.name}' has no blendshapes, only units, got {shapes!r}"
                              "; make an avatar of it or leave this out")
-        atoms = unit_atoms(None if shapes is None or isinstance(shapes, str) else shapes)
-        return _units(atoms)
+        return _units(unit_atoms(None if shapes in (None, "units") else [shapes] if isinstance(shapes, str) else shapes))
     by_set: dict[str, dict[str, str]] = {}                  # set -> shape -> the file's name of it
     for name, (shape, recipe) in face.known.items():
         by_set.setdefault(recipe.set, {})[shape.removeprefix(CLASH)] = name
     if shapes is None:
         shapes = next((kind for kind, least in (("arkit", _MOST_OF_ARKIT), ("units", _MOST_OF_UNITS))
                        if len(by_set.get(kind, ())) >= least), "shapes")
-    if not isinstance(shapes, str):
-        return _named(face, list(shapes))
-    if shapes not in (*SETS, "shapes"):
-        raise InputError(f"shapes: expected {', '.join(SETS)}, shapes, or names, got {shapes!r}"
-                         f"{nearest(shapes, (*SETS, 'shapes'))}")
+    if not isinstance(shapes, str) or shapes not in (*SETS, "shapes"):
+        return _named(face, [shapes] if isinstance(shapes, str) else list(shapes))
     if shapes == "shapes":
         halves = set(face.notes.halves.values())
         names = tuple(name for name in face.shapes if name not in halves)
@@ -113,8 +109,8 @@ def _named(face: AvatarFace, names: list[str]) -> Wanted:
     mine = {shape: name for name, (shape, _) in face.known.items()}
     for name in names:
         if name not in face.shapes and name not in mine:
-            raise InputError(f"shapes: {face.path.name} has no shape '{name}'"
-                             f"{nearest(str(name), (*face.shapes, *mine))}")
+            raise InputError(f"shapes: {face.path.name} has no shape '{name}', and there is no set of that name"
+                             f"{nearest(str(name), (*face.shapes, *mine, *SETS))}")
     columns = tuple(dict.fromkeys(name if name in face.shapes else mine[name] for name in names))
     if not columns:
         raise InputError("shapes: expected one name or more, got none")
