@@ -11,7 +11,8 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg.lapack import dposv
+from scipy.linalg.lapack import dposv, dpotrf, dtrtrs
+from scipy.optimize import nnls
 
 Array = NDArray[np.float64]
 
@@ -51,6 +52,28 @@ def box_minimum(hessian: Array, goal: Array, low: Array, high: Array, start: Arr
                 return there
         x = there
     return x
+
+
+def bowl_minimum(hessian: Array, goal: Array, low: Array, high: Array, loose: int) -> Array:
+    """Return the same where the first ``loose`` variables have no bounds and all others a lower one.
+
+    Upper bounds are seldom met: without them it is a problem of non-negative numbers, for which SciPy has compiled
+    code (C. Lawson, R. Hanson, "Solving least squares problems", 1974); where they are met, it is `box_minimum`.
+    """
+    across = hessian[:loose, loose:]
+    _, solved, failed = dposv(hessian[:loose, :loose], np.column_stack([across, goal[:loose]]), lower=1)
+    floor = low[loose:]
+    reduced = hessian[loose:, loose:] - across.T @ solved[:, :-1]
+    right = goal[loose:] - across.T @ solved[:, -1] - reduced @ floor
+    root, wrong = dpotrf(reduced, lower=0)
+    if not failed and not wrong:
+        try:
+            found = floor + nnls(np.triu(root), dtrtrs(root, right, lower=0, trans=1)[0])[0]
+        except RuntimeError:            # too many rounds
+            found = np.full(len(floor), np.inf)
+        if (found <= high[loose:]).all():
+            return np.concatenate([solved[:, -1] - solved[:, :-1] @ found, found])
+    return box_minimum(hessian, goal, low, high)
 
 
 def _inside(hessian: Array, slope: Array, x: Array, low: Array, high: Array, free: NDArray[np.bool_]) -> Array:

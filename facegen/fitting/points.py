@@ -44,13 +44,15 @@ class Points(Protocol):
 
 
 class Mix(Protocol):
-    """c(x): parameters to coefficients of a basis."""
+    """c(x): parameters to coefficients of a basis. ``linear``: whether slopes are the same for all x."""
+
+    linear: bool
 
     def coefficients(self, x: Array) -> Array:
         """Return the coefficients (b,)."""
 
-    def slope(self, x: Array) -> Array | None:
-        """Return how they change, (b, k); None if they are the parameters themselves."""
+    def slope(self, x: Array) -> Array:
+        """Return how they change, (b, k)."""
 
     def weights(self, x: Array) -> Array:
         """Return the shapes' weights (k,)."""
@@ -64,6 +66,11 @@ class Shapes:
     count: int
     halves: Mapping[int, int]
     pairs: Mapping[int, int]
+
+    @property
+    def linear(self) -> bool:
+        """Whether slopes are the same for all weights."""
+        return not self.halves
 
     def weights(self, x: Array) -> Array:
         """Return the shapes' weights (k,): what a corrective corrects comes with it."""
@@ -81,10 +88,8 @@ class Shapes:
         inside = np.clip(weights[columns], 0.0, 1.0)
         return np.concatenate([weights, 4.0 * inside * (1.0 - inside)])
 
-    def slope(self, x: Array) -> Array | None:
+    def slope(self, x: Array) -> Array:
         """Return how the coefficients change, (b, k)."""
-        if not self.halves and not self.pairs:
-            return None
         slope = np.vstack([np.eye(self.count), np.zeros((len(self.halves), self.count))])
         weights = self.weights(x)
         for row, column in enumerate(self.halves):
@@ -108,13 +113,16 @@ class BlendPoints:
 
     def slopes(self, x: Array) -> Array:
         """Return (3 p, k)."""
-        slope = self.mix.slope(x)
-        return self._basis if slope is None else self._basis @ slope
+        if self.mix.linear:
+            return self._constant[0]
+        return self._basis @ self.mix.slope(x)
 
     def gram(self, x: Array) -> Array:
         """Return (k, k), from products that were made once."""
+        if self.mix.linear:
+            return self._constant[1]
         slope = self.mix.slope(x)
-        return self._products if slope is None else slope.T @ self._products @ slope
+        return slope.T @ self._products @ slope
 
     def weights(self, x: Array) -> Array:
         """Return the weights (k,)."""
@@ -125,6 +133,12 @@ class BlendPoints:
         other = object.__new__(BlendPoints)
         other.__dict__.update(self.__dict__, rest=self.rest + offset)
         return other
+
+    @cached_property
+    def _constant(self) -> tuple[Array, Array]:
+        slope = self.mix.slope(self.low)
+        slopes = np.ascontiguousarray(self._basis @ slope)
+        return slopes, slopes.T @ slopes
 
     @cached_property
     def _products(self) -> Array:

@@ -46,7 +46,8 @@ def wanted(face: Rig, shapes: str | Sequence[str] | None = None) -> Wanted:
         if isinstance(shapes, str) and shapes in (*SETS, "shapes") and shapes != "units":
             raise InputError(f"shapes: the parametric face '{face.name}' has no blendshapes, only units, got {shapes!r}"
                              "; make an avatar of it or leave this out")
-        return _units(unit_atoms(None if shapes in (None, "units") else [shapes] if isinstance(shapes, str) else shapes))
+        given = [shapes] if isinstance(shapes, str) else shapes
+        return _units(unit_atoms(None if shapes in (None, "units") else given))
     by_set: dict[str, dict[str, str]] = {}                  # set -> shape -> the file's name of it
     for name, (shape, recipe) in face.known.items():
         by_set.setdefault(recipe.set, {})[shape.removeprefix(CLASH)] = name

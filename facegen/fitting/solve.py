@@ -17,7 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from facegen.fitting.box import box_minimum
+from facegen.fitting.box import bowl_minimum
 from facegen.fitting.head_pose import HeadPose, small_turn
 from facegen.fitting.points import Points
 from facegen.fitting.views import Space, View
@@ -36,6 +36,7 @@ _HALVINGS = 8
 _LENGTHS = np.array([1.0, 1.0, 1.0, 100.0, 100.0, 100.0, 1.0, 1.0])
 # Keeps directions that nothing determines (the depth of a weak perspective) where they are; in 1 / mm^2 and 1 / rad^2.
 _RIDGE = 1e-9
+_FREE = np.full(7, -np.inf)         # a pose has no bounds
 
 
 @dataclass(frozen=True)
@@ -133,36 +134,33 @@ def _step(points: Points, view: View, x: Array, pose: HeadPose, rest: Array, see
     k, p = len(x), len(rest)
     slopes = points.slopes(x)
     by_place, by_zoom = view.slopes(seen, pose.zoom)
-    size = by_zoom.shape[1]
-    root = np.sqrt(counts)
-    posed = np.empty((p, size, 7))
-    spin = np.zeros((p, 3, 3))                                  # d (turn @ q) by a further small turn: -[rest]x
-    spin[:, 0, 1], spin[:, 0, 2], spin[:, 1, 2] = rest[:, 2], -rest[:, 1], rest[:, 0]
-    spin[:, 1, 0], spin[:, 2, 0], spin[:, 2, 1] = -rest[:, 2], rest[:, 1], -rest[:, 0]
-    posed[:, :, :3], posed[:, :, 3:6] = by_place @ spin, by_place
-    posed[:, :, 6] = by_zoom if view.zooms else 0.0
-    posed *= root[:, None, None]
-    gap = (off * root[:, None]).ravel()
-    hessian = np.zeros((7 + k, 7 + k))
-    flat = posed.reshape(-1, 7)
+    size, root = by_zoom.shape[1], np.sqrt(counts)
     even = size == 3 and bool((counts == counts[0]).all())
-    turned = (by_place @ pose.turn) * root[:, None, None]       # (p, size, 3)
+    moved = np.empty((p, size, 7 if even else 7 + k))
+    way = by_place * root[:, None, None]                            # (p, size, 3)
+    u, v, w = (way[:, :, i] for i in range(3))
+    a, b, c = (rest[:, i, None] for i in range(3))
+    moved[:, :, 0], moved[:, :, 1], moved[:, :, 2] = b * w - c * v, c * u - a * w, a * v - b * u    # rest x way
+    moved[:, :, 3:6] = way
+    moved[:, :, 6] = by_zoom * root[:, None] if view.zooms else 0.0
+    turned = (way.reshape(-1, 3) @ pose.turn).reshape(p, size, 3)
+    gap = (off * root[:, None]).ravel()
     if even:            # in space a turn changes no product of slopes: they were made once
-        back = np.swapaxes(turned, 1, 2)                        # scale * turn'
+        hessian, flat, back = np.empty((7 + k, 7 + k)), moved.reshape(-1, 7), np.swapaxes(turned, 1, 2)
+        hessian[:7, :7] = flat.T @ flat
+        hessian[:7, 7:] = (back @ moved).reshape(-1, 7).T @ slopes
+        hessian[7:, :7] = hessian[:7, 7:].T
         hessian[7:, 7:] = points.gram(x) * float(counts[0] * pose.zoom**2)
-        hessian[:7, 7:] = (back @ posed).reshape(-1, 7).T @ slopes
-        goal = (back @ gap.reshape(p, size, 1)).ravel() @ slopes
+        slope = np.concatenate([gap @ flat, (back @ gap.reshape(p, size, 1)).ravel() @ slopes])
     else:
-        moved = (turned @ slopes.reshape(p, 3, k)).reshape(-1, k)
-        hessian[7:, 7:] = moved.T @ moved
-        hessian[:7, 7:] = flat.T @ moved
-        goal = gap @ moved
-    hessian[7:, :7] = hessian[:7, 7:].T
-    hessian[:7, :7] = flat.T @ flat
-    slope = np.concatenate([gap @ flat, goal + tax + pull * (x - middle)])
-    diagonal = np.arange(7 + k)
-    hessian[diagonal[7:], diagonal[7:]] += pull + _RIDGE
-    hessian[diagonal[:7], diagonal[:7]] += _RIDGE * (1.0 + np.diagonal(hessian)[:7])
-    low = np.concatenate([np.full(7, -np.inf), points.low - x])
-    high = np.concatenate([np.full(7, np.inf), points.high - x])
-    return box_minimum(hessian, -slope, low, high)
+        np.matmul(turned, slopes.reshape(p, 3, k), out=moved[:, :, 7:])
+        flat = moved.reshape(-1, 7 + k)
+        hessian, slope = flat.T @ flat, gap @ flat
+    slope[7:] += tax + pull * (x - middle)
+    diagonal = hessian.diagonal().copy()
+    diagonal[:7] *= 1.0 + _RIDGE
+    diagonal[:7] += _RIDGE
+    diagonal[7:] += pull + _RIDGE
+    np.fill_diagonal(hessian, diagonal)
+    low = np.concatenate([_FREE, points.low - x])
+    return bowl_minimum(hessian, -slope, low, np.concatenate([-_FREE, points.high - x]), 7)

@@ -50,6 +50,8 @@ class UnitMix:
     """Weights of units to coefficients of an avatar's shapes. columns: member of the unit table -> row of the basis;
     halves: row -> row that corrects it half way."""
 
+    linear = False
+
     def __init__(self, atoms: Sequence[str], columns: Mapping[str, int], halves: Mapping[int, int], size: int) -> None:
         self.atoms, self.columns, self.halves, self.size = tuple(atoms), columns, halves, size
 

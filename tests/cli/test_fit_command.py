@@ -78,7 +78,7 @@ def test_shares_of_a_picture_want_its_size(run, hero, smile, tmp_path):
     code, _, err = run("fit", tmp_path / "mp.json", "--rig", hero, "-o", tmp_path / "w.csv")
     assert code == 2
     assert "picture: the points are shares" in err
-    code, _, err = run("fit", tmp_path / "mp.json", "--rig", hero, "--picture", "640x480", "-o", tmp_path / "w.csv", "-q")
+    code, _, err = run("fit", tmp_path / "mp.json", "--rig", hero, "--picture", "640x480", "-o", tmp_path / "w.csv")
     assert code == 0, err
     assert load_performance(tmp_path / "w.csv").column("mouthSmileLeft")[2] > 0.6
 
