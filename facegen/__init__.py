@@ -19,7 +19,9 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from facegen.animation.clip import Clip
     from facegen.animation.performance import Performance
+    from facegen.animation.playback import Playback
     from facegen.animation.script import load_clip, morph
+    from facegen.animation.streams.files import load_performance, save_performance
     from facegen.blendshapes.recipes import Recipe, shape_set
     from facegen.errors import FacegenError, FileError, InputError, JobError, NotationError, TableError
     from facegen.face.avatar import AvatarFace
@@ -37,10 +39,12 @@ if TYPE_CHECKING:
     from facegen.fitting.fit import Fitted, fit_landmarks, fit_markers, fit_meshes
     from facegen.fitting.views import Pinhole, WeakCamera
     from facegen.geometry.mesh import Mesh
+    from facegen.jobs.adopting import adopt
     from facegen.jobs.batch import run_batch
     from facegen.jobs.frames import save_clip, save_turn
     from facegen.jobs.rigging import rig
     from facegen.render import Renderer, Wireframe, render, render_passes, save_passes
+    from facegen.render.live import Live
     from facegen.transfer.rig import avatar_names
 
 __version__ = "0.1.0"
@@ -58,16 +62,19 @@ __all__ = [
     "Fitted",
     "InputError",
     "JobError",
+    "Live",
     "Mesh",
     "NotationError",
     "Performance",
     "Pinhole",
+    "Playback",
     "Recipe",
     "Renderer",
     "Resolution",
     "TableError",
     "WeakCamera",
     "Wireframe",
+    "adopt",
     "avatar_names",
     "canonical",
     "contact_sheet",
@@ -82,6 +89,7 @@ __all__ = [
     "load_deformation",
     "load_expressions",
     "load_face",
+    "load_performance",
     "load_person",
     "load_units",
     "morph",
@@ -97,6 +105,7 @@ __all__ = [
     "save_clip",
     "save_image",
     "save_passes",
+    "save_performance",
     "save_turn",
     "save_video",
     "shape_set",
@@ -106,7 +115,9 @@ __all__ = [
 _HOMES = {
     "facegen.animation.clip": ("Clip",),
     "facegen.animation.performance": ("Performance",),
+    "facegen.animation.playback": ("Playback",),
     "facegen.animation.script": ("load_clip", "morph"),
+    "facegen.animation.streams.files": ("load_performance", "save_performance"),
     "facegen.blendshapes.recipes": ("Recipe", "shape_set"),
     "facegen.errors": ("FacegenError", "FileError", "InputError", "JobError", "NotationError", "TableError"),
     "facegen.face.avatar": ("AvatarFace",),
@@ -124,9 +135,11 @@ _HOMES = {
     "facegen.fitting.fit": ("Fitted", "fit_landmarks", "fit_markers", "fit_meshes"),
     "facegen.fitting.views": ("Pinhole", "WeakCamera"),
     "facegen.geometry.mesh": ("Mesh",),
+    "facegen.jobs.adopting": ("adopt",),
     "facegen.jobs.batch": ("run_batch",),
     "facegen.jobs.frames": ("save_clip", "save_turn"),
     "facegen.jobs.rigging": ("rig",),
+    "facegen.render.live": ("Live",),
     "facegen.render.overlay": ("Wireframe",),
     "facegen.render.passes": ("render_passes",),
     "facegen.render.passfiles": ("save_passes",),

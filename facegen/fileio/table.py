@@ -13,9 +13,10 @@ import math
 import re
 from array import array
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import chain, islice
 from pathlib import Path
 
 import numpy as np
@@ -80,6 +81,11 @@ def fold(name: str) -> str:
     return re.sub(r"\s+", "", name).casefold()
 
 
+def are_numbers(names: Sequence[str]) -> bool:
+    """Return whether most of what should be names are numbers: a header that is missing."""
+    return 2 * sum(_number(name, ";") is not None for name in names) > len(names)
+
+
 def shown(text: str) -> str:
     """Return a text as it may stand in a message: quoted, short."""
     return repr(text if len(text) <= 40 else text[:37] + "...")
@@ -134,23 +140,22 @@ class _Reader:
             raise FileError(f"{self.path}: is empty")
         self._header(*first)
         rows = self._rows(lines)
-        ahead = [row for _, row in zip(range(_SNIFFED), rows, strict=False)]
+        ahead = list(islice(rows, _SNIFFED))
         if not ahead:
             raise FileError(f"{self.path}: no row can be read below the header in line {first[0]}"
                             + "".join(f"; {warning}" for warning in self._warnings()))
-        is_text = [self._is_text([row[k] for _, row in ahead]) for k in range(self.width)]
+        is_text = [self._is_text([row[k] for _, row, _ in ahead]) for k in range(self.width)]
         numeric = [k for k in range(self.width) if not is_text[k]]
         wordy = [k for k in range(self.width) if is_text[k]]
         flat, words = array("d"), {k: [] for k in wordy}
-        for block in (ahead, rows):
-            for line, row in block:
-                flat.extend(self._numbers(line, row, numeric))
-                for k in wordy:
-                    words[k].append(row[k])
-                self.lines.append(line)
-                if len(self.lines) * self.width > MOST_CELLS:
-                    raise FileError(f"{self.path}: line {line}: more than {MOST_CELLS:,} numbers; "
-                                    f"split the recording, or leave out columns that are not needed")
+        for line, row, plain in chain(ahead, rows):
+            flat.extend(self._numbers(line, [row[k] for k in numeric] if wordy else row, numeric, plain))
+            for k in wordy:
+                words[k].append(row[k])
+            self.lines.append(line)
+            if len(self.lines) * self.width > MOST_CELLS:
+                raise FileError(f"{self.path}: line {line}: more than {MOST_CELLS:,} numbers; "
+                                f"split the recording, or leave out columns that are not needed")
         values = np.frombuffer(flat, dtype=np.float64).reshape(len(self.lines), len(numeric))
         return Table(self.path, self.names, np.array(self.lines, dtype=np.int64),
                      {self.names[k]: np.ascontiguousarray(values[:, i]) for i, k in enumerate(numeric)},
@@ -164,7 +169,7 @@ class _Reader:
         names = _names(text)
         if len(names) > MOST_COLUMNS:
             raise FileError(f"{self.path}: line {line}: {len(names):,} columns; expected at most {MOST_COLUMNS:,}")
-        if sum(_number(name, self.delimiter) is not None for name in names) * 2 > len(names):
+        if are_numbers(names):
             raise FileError(f"{self.path}: line {line}: expected the names of the columns, got numbers "
                             f"({shown(text.strip())}): put the header back on top")
         if len(names) > 1 and not names[-1]:
@@ -178,8 +183,8 @@ class _Reader:
         self.names = tuple(names[k] for k in self.keep)
         self.width = len(self.names)
 
-    def _rows(self, lines: Iterable[tuple[int, str]]) -> Iterator[tuple[int, list[str]]]:
-        """Yield the line and the cells of each row that has a cell for each name."""
+    def _rows(self, lines: Iterable[tuple[int, str]]) -> Iterator[tuple[int, list[str], bool]]:
+        """Yield the line and the cells of each row that has a cell for each name, and whether it is free of "_"."""
         for line, text in lines:
             if len(text) > LONGEST_LINE:
                 raise FileError(f"{self.path}: line {line}: longer than {LONGEST_LINE:,} characters")
@@ -198,27 +203,28 @@ class _Reader:
                     self._tell(f"left out, for they do not have the header's {self.fields} fields",
                                f"{line} ({len(cells)})")
                 continue
-            yield line, cells if len(self.keep) == self.fields else [cells[k] for k in self.keep]
+            yield line, cells if len(self.keep) == self.fields else [cells[k] for k in self.keep], "_" not in text
 
     def _is_text(self, cells: list[str]) -> bool:
         there = [cell for cell in cells if cell.strip().casefold() not in _MISSING]
         return 2 * sum(_number(cell, self.delimiter) is None for cell in there) > len(there)
 
-    def _numbers(self, line: int, row: list[str], numeric: list[int]) -> list[float]:
+    def _numbers(self, line: int, cells: list[str], numeric: list[int], plain: bool) -> list[float]:
+        """Return the numbers of a row's cells; at once where all are numbers, else one by one."""
         try:
-            values = [float(row[k]) for k in numeric]
-            if math.isfinite(sum(values)) and not any("_" in row[k] for k in numeric):
+            values = list(map(float, cells)) if plain or not any("_" in cell for cell in cells) else [math.nan]
+            if math.isfinite(sum(values)):
                 return values
         except ValueError:
             pass
         values = []
-        for k in numeric:
+        for k, cell in zip(numeric, cells, strict=True):
             value = math.nan
-            if row[k].strip().casefold() not in _MISSING:
-                found = _number(row[k], self.delimiter)
+            if cell.strip().casefold() not in _MISSING:
+                found = _number(cell, self.delimiter)
                 if found is None:
                     self._tell("no numbers, and counted as missing",
-                               f"{shown(row[k].strip())} in line {line}, column '{self.names[k]}'")
+                               f"{shown(cell.strip())} in line {line}, column '{self.names[k]}'")
                 else:
                     value = found
             values.append(value)

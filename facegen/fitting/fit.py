@@ -148,10 +148,10 @@ def _mesh_rows(face: Rig) -> NDArray[np.int64]:
         offset = len(mesh.part_vertices("skin")) - len(cage.part_vertices("skin"))
         rows = np.concatenate([cage.part_vertices("skin"), *(cage.part_vertices(part) + offset for part in mesh.parts
                                                              if part.startswith(("eye", "teeth_lower", "tongue")))])
-        return rows[face.head_share(2)[rows] > _OF_HEAD]
+        return rows[face.neck_weight(2)[rows, 0] > _OF_HEAD]
     rows = face.focus if face.focus is not None else np.unique(mesh.faces)
     if face.notes.framed:
-        rows = rows[face.head_share()[rows] > _OF_HEAD]
+        rows = rows[face.neck_weight[rows, 0] > _OF_HEAD]
     return rows[::-(-len(rows) // _MOST_VERTICES)]
 
 

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import sparse
 
 from facegen.blendshapes.names import member_of
@@ -82,7 +81,7 @@ def rig_points(face: Rig, place: sparse.csr_array, want: Wanted, *, detail: int 
         members = {column: column for column in want.columns}
     names = list(members.values())
     halves = {row: half for row, name in enumerate(names) if (half := face.notes.halves.get(name)) in face.shapes}
-    basis = np.array([_motion(face, place, name) for name in [*names, *halves.values()]]).reshape(-1, *rest.shape)
+    basis = np.array([place @ face.motion(name) for name in [*names, *halves.values()]]).reshape(-1, *rest.shape)
     if want.vocabulary == "units":
         rows = {member: row for row, member in enumerate(members)}
         return BlendPoints(want.names, rest, basis, UnitMix(want.columns, rows, {
@@ -119,9 +118,3 @@ def _named(face: AvatarFace, names: list[str]) -> Wanted:
     if kinds == {"arkit"} or kinds == {"visemes"} or kinds == {"vrm"}:
         return Wanted(kinds.pop(), tuple(face.known[name][0] for name in columns), columns)
     return Wanted("shapes", columns, columns)
-
-
-def _motion(face: AvatarFace, place: sparse.csr_array, name: str) -> NDArray[np.float64]:
-    """Return how the places (p, 3) move in a shape."""
-    rows, moves = face.moved(name)
-    return place[:, rows] @ moves

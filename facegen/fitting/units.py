@@ -7,6 +7,7 @@ the parametric face keeps them as long as the pose stays near (its jaw turns and
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import fields
 from functools import lru_cache
 
 import numpy as np
@@ -17,7 +18,7 @@ from facegen.animation.angles import reach
 from facegen.blendshapes.names import member_of
 from facegen.blendshapes.recipes import is_head
 from facegen.face.avatar import held
-from facegen.face.face import DEEPEST_FOLD, Controls, Face
+from facegen.face.face import Controls, Face
 from facegen.facs.tables import load_units
 
 Array = NDArray[np.float64]
@@ -149,19 +150,11 @@ class _Basis:
 
     def __init__(self, face: Face) -> None:
         self.face = face
-        basis = load_units().basis
+        basis, points = load_units().basis, list(face.feature_points)
         self.rows = {member: row for row, member in enumerate(basis)}
-        found = [face.controls(one, strict=False) for one in basis.values()]
-        resting = [face.controls(type(one)(one.points, {}, {}, {}, {}, one.folds, one.units), strict=False)
-                   for one in basis.values()]
-        self.vectors = np.array([one.vectors for one in resting])                   # without what turns with the jaw
-        self.jaw, self.head = np.array([one.jaw for one in found]), np.array([one.head for one in found])
-        self.lids = np.array([[one.lids.get(key, 0.0) for key in ("upper_L", "lower_L", "upper_R", "lower_R")]
-                              for one in basis.values()])
-        self.eyes, self.folds = np.array([one.eyes for one in found]), np.array([one.folds for one in found])
-        points = list(face.feature_points)
-        turning = face.deformer.jaw_share != 0.0
-        self.with_jaw = np.array([[name in one.with_jaw for name in points] for one in basis.values()]) & ~turning
+        found = [face.linear_controls(one, strict=False) for one in basis.values()]
+        self.moves = {part.name: np.array([getattr(one, part.name) for one in found]) for part in fields(Controls)}
+        self.with_jaw = np.array([[name in one.with_jaw for name in points] for one in basis.values()], float)
 
     def controls(self, atoms: Sequence[str], xs: Array) -> Controls:
         """Return the deformer's input for m sets of weights of the atoms, and of the gaze, (m, k)."""
@@ -175,13 +168,8 @@ class _Basis:
                 row[self.rows[plus if angle >= 0.0 else minus]] = abs(angle) / _degrees(axis, angle)
             for member, value in table.coefficients(units).items():
                 row[self.rows[member]] = value
-        vectors = np.tensordot(many, self.vectors, 1)
-        jaw, eyes = many @ self.jaw, many @ self.eyes
-        turning = ((many != 0.0).astype(float) @ self.with_jaw > 0.0)[..., None]
-        if turning.any() and np.any(jaw):
-            vectors = vectors + turning * self.face.deformer.jaw.movement(self.face.deformer.points, jaw)
-        folds = np.minimum(many @ self.folds, DEEPEST_FOLD)
-        return Controls(vectors, jaw, self.face.following_lids(many @ self.lids, eyes), eyes, many @ self.head, folds)
+        linear = Controls(**{name: np.tensordot(many, moves, 1) for name, moves in self.moves.items()})
+        return self.face.finished_controls(linear, (many != 0.0) @ self.with_jaw > 0.0)
 
 
 _TURNS = {"yaw": ("61", "62"), "pitch": ("63", "64")}

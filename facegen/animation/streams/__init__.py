@@ -8,7 +8,12 @@
     save_performance(performance, "take.csv", format="livelink")
 """
 
+from facegen.animation.streams.calibrate import Calibration, calibrated
 from facegen.animation.streams.files import load_performance, save_performance
 from facegen.animation.streams.formats import FORMATS, Format, Sample, Wish, register
+from facegen.animation.streams.resample import resampled
+from facegen.animation.streams.smooth import Filter, OneEuro, smoothed
+from facegen.animation.streams.translate import translated
 
-__all__ = ["FORMATS", "Format", "Sample", "Wish", "load_performance", "register", "save_performance"]
+__all__ = ["FORMATS", "Calibration", "Filter", "Format", "OneEuro", "Sample", "Wish", "calibrated",
+           "load_performance", "register", "resampled", "save_performance", "smoothed", "translated"]

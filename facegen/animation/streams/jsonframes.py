@@ -4,25 +4,30 @@ from __future__ import annotations
 
 import json
 import re
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Generic, TypeVar
 
 from facegen.errors import FileError
 
-MOST_BYTES = 400_000_000
-"""Because parsed JSON takes up to thirty times its text, and an hour of blendshapes is a quarter of this."""
+MOST_BYTES = 1_000_000_000
+"""Because the text is held in memory; an hour of blendshapes is a third of this, a quarter with landmarks all."""
+
+Kept = TypeVar("Kept")
 
 _LISTS = ("frames", "results", "data")
 _GAP = re.compile(r"[\s,]*")
+# An object that begins with plain values and a list of frames: then each frame is read by itself.
+_BEGINNING = re.compile(r'\s*\{\s*(?:"[^"\\]*"\s*:\s*(?:"[^"\\]*"|[^\s",{}\[\]]+)\s*,\s*)*'
+                        rf'"(?:{"|".join(_LISTS)})"\s*:\s*\[')
 
 
 @dataclass(frozen=True)
 class Frame:
-    """One frame's value, and the line it begins in."""
+    """One frame's value."""
 
     value: Any
-    line: int
 
     def get(self, *keys: str) -> Any:
         """Return the value of the first of several keys, whatever its capitals; also of an inner "results"; or None."""
@@ -39,8 +44,12 @@ class Frame:
         return None
 
 
-def frames_of(path: Path) -> tuple[list[Frame], list[str]]:
-    """Return the frames of a file and what was odd. FileError: no such file, too large, no JSON, no frames."""
+def frames_of(path: Path, keep: Callable[[Frame], Kept]) -> tuple[list[Kept], list[int], list[str]]:
+    """Return what is kept of each frame of a file, the frames' lines, and what was odd.
+
+    keep: takes of a frame what is needed: the rest is forgotten before the next is read. FileError: no such file, too
+    large, no JSON, no frames.
+    """
     try:
         if path.stat().st_size > MOST_BYTES:
             raise FileError(f"{path}: larger than {MOST_BYTES // 1_000_000} MB; write one frame a line and split it")
@@ -51,62 +60,69 @@ def frames_of(path: Path) -> tuple[list[Frame], list[str]]:
         raise FileError(f"{path}: not UTF-8 text (byte {error.start}); save it as UTF-8") from None
     except (OSError, ValueError) as error:
         raise FileError(f"{path}: cannot be read ({'it is a folder' if path.is_dir() else error})") from None
-    frames, said = _Reader(path, text).read()
-    if not frames:
+    reader = _Reader(path, text, keep)
+    reader.read()
+    if not reader.kept:
         raise FileError(f"{path}: has no frames")
-    return frames, said
+    return reader.kept, reader.lines, reader.said
 
 
-class _Reader:
+class _Reader(Generic[Kept]):
     """Reads one value after the other, so that what stops in the middle loses its last one only."""
 
-    def __init__(self, path: Path, text: str) -> None:
-        self.path, self.text = path, text
+    def __init__(self, path: Path, text: str, keep: Callable[[Frame], Kept]) -> None:
+        self.path, self.text, self.keep = path, text, keep
         self.decoder = json.JSONDecoder(parse_constant=lambda word: None)      # NaN counts as missing
         self.counted, self.line = 0, 1
+        self.kept: list[Kept] = []
+        self.lines: list[int] = []
+        self.said: list[str] = []
 
-    def read(self) -> tuple[list[Frame], list[str]]:
+    def read(self) -> None:
+        """Read all frames."""
         start = len(self.text) - len(self.text.lstrip())
         if self.text[start:start + 1] == "[":
-            return self._values(start + 1)
+            return self._values(start + 1, listed=True)
+        if found := _BEGINNING.match(self.text):
+            return self._values(found.end(), listed=True)
         first = self._value(start)
-        if first is None:                               # an object that stops: its list may be there
-            found = re.search(rf'"(?:{"|".join(_LISTS)})"\s*:\s*\[', self.text[:10_000])
-            if found is None:
-                raise self._broken(start)
-            return self._values(found.end())
+        if first is None:
+            raise self._broken(start)
         value, end = first
-        if isinstance(value, dict):
-            inside = next((value[key] for key in _LISTS if isinstance(value.get(key), list)), None)
-            if inside is not None and not self.text[end:].strip():
-                return [Frame(one, self._line(start)) for one in inside], []
-            if inside is None or self.text[end:].strip():
-                return self._values(start)
-        raise FileError(f"{self.path}: expected a list of frames, or an object with one")
+        inside = next((value[key] for key in _LISTS if isinstance(value.get(key), list)), None) \
+            if isinstance(value, dict) else None
+        if inside is None or self.text[end:].strip():   # a result by itself, or the first of one a line
+            return self._values(start, listed=False)
+        for one in inside:
+            self._take(one, self._line(start))
+        return None
 
-    def _values(self, at: int) -> tuple[list[Frame], list[str]]:
-        frames, said = [], []
+    def _values(self, at: int, *, listed: bool) -> None:
         while True:
             at = _GAP.match(self.text, at).end()
             if at >= len(self.text) or self.text[at] in "]}":
-                return frames, said
+                if listed and at >= len(self.text):
+                    self.said.append(f"the file stops before its list ends; its {len(self.kept)} frames are kept")
+                return
             found = self._value(at)
             if found is None:
-                if not frames:
+                if not self.kept:
                     raise self._broken(at)
-                rest = self.text[at:]
-                line = self._line(at)
-                after = rest.find("\n{")
-                if after < 0 or not rest[after:].strip():
-                    said.append(f"line {line}: the file stops in the middle of a frame, or cannot be read from here; "
-                                f"the {len(frames)} frames before it are kept")
-                    return frames, said
-                said.append(f"line {line}: cannot be read as JSON; left out")      # one result a line: go on
-                at += after + 1
+                line, after = self._line(at), self.text.find("\n{", at)
+                if after < 0:
+                    self.said.append(f"line {line}: the file stops in the middle of a frame, or cannot be read from "
+                                     f"here; the {len(self.kept)} frames before it are kept")
+                    return
+                self.said.append(f"line {line}: cannot be read as JSON; left out")     # one result a line: go on
+                at = after + 1
                 continue
             value, end = found
-            frames.append(Frame(value, self._line(at)))
+            self._take(value, self._line(at))
             at = end
+
+    def _take(self, value: Any, line: int) -> None:
+        self.kept.append(self.keep(Frame(value)))
+        self.lines.append(line)
 
     def _value(self, at: int) -> tuple[Any, int] | None:
         try:

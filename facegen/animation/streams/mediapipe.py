@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -56,18 +57,16 @@ def knows_csv(sample: Sample) -> bool:
 
 def read_json(path: Path, wish: Wish) -> Performance:
     """Return the performance of a file. FileError, InputError."""
-    frames, said = frames_of(path)
+    frames, at, said = frames_of(path, _result)
     known = dict.fromkeys(shape_set("arkit"), ())
     which = _person(path, frames, wish, said)
     found: list[dict[str, float]] = []
     times, head, place = [], np.full((len(frames), 3), np.nan), np.full((len(frames), 3), np.nan)
     for k, frame in enumerate(frames):
-        faces = _faces(frame)
-        found.append(_scores(faces[which]) if which < len(faces) else {})
-        times.append(_time(frame))
-        matrix = _matrix(frame, which)
-        if matrix is not None:
-            head[k], place[k] = matrix
+        found.append(frame.faces[which] if which < len(frame.faces) else {})
+        times.append(frame.time)
+        if which < len(frame.turns) and frame.turns[which] is not None:
+            head[k], place[k] = frame.turns[which]
     names = list(dict.fromkeys(name for one in found for name in one))
     spelt = match(names, known)
     if not spelt:
@@ -83,10 +82,9 @@ def read_json(path: Path, wish: Wish) -> Performance:
     strange = [name for name in extra if name != NEUTRAL]
     if strange:
         said.append(f"no shapes of ARKit, kept aside: {', '.join(strange[:5])}{' ...' if len(strange) > 5 else ''}")
-    lines = np.array([frame.line for frame in frames])
-    rows, odd = in_order(path, _seconds(path, times, len(frames), wish), lines)
-    stamps = _seconds(path, times, len(frames), wish)[rows]
-    return Performance(stamps, tuple(order), weights[rows], "arkit",
+    stamps = _seconds(path, times, len(frames), wish)
+    rows, odd = in_order(path, stamps, np.array(at))
+    return Performance(stamps[rows], tuple(order), weights[rows], "arkit",
                        head[rows] if np.isfinite(head).any() else None,
                        place[rows] if np.isfinite(place).any() else None,
                        extra={name: column[rows] for name, column in extra.items()},
@@ -153,9 +151,24 @@ def write_csv(one: Performance, path: Path) -> None:
     tabular.save_table(path, before | {name: tabular.again(name, now, before) for name, now in made.items()})
 
 
-def _person(path: Path, frames: Sequence[Frame], wish: Wish, said: list[str]) -> int:
+@dataclass(frozen=True)
+class _Result:
+    """What is needed of one result: the scores of each face, when it was, and head and place of each face."""
+
+    faces: list[dict[str, float]]
+    time: tuple[str, float] | None
+    turns: list[tuple[Array, Array] | None]
+
+
+def _result(frame: Frame) -> _Result:
+    matrices = frame.get(*_MATRICES)
+    return _Result([_scores(face) for face in _faces(frame)], _time(frame),
+                   [_turn(one) for one in matrices] if isinstance(matrices, list) else [])
+
+
+def _person(path: Path, frames: Sequence[_Result], wish: Wish, said: list[str]) -> int:
     """Return which face of each frame is meant: they are counted from 0."""
-    most = max(len(_faces(frame)) for frame in frames)
+    most = max(len(frame.faces) for frame in frames)
     if wish.person is None:
         if most > 1:
             said.append(f"up to {most} faces in a frame; took the first: say which person for another")
@@ -228,12 +241,8 @@ def _as_seconds(stamps: Array) -> Array:
     return (stamps - (there[0] if there[0] > 1e9 else 0.0)) / (1000.0 if step >= _LEAST_STEP_MS else 1.0)
 
 
-def _matrix(frame: Frame, which: int) -> tuple[Array, Array] | None:
-    """Return head and place of a result's matrix; None for none, or what is no turn."""
-    found = frame.get(*_MATRICES)
-    if not isinstance(found, list) or which >= len(found):
-        return None
-    one = found[which]
+def _turn(one: Any) -> tuple[Array, Array] | None:
+    """Return head and place of a matrix; None for what is no turn."""
     data = one.get("data") if isinstance(one, Mapping) else one
     try:
         matrix = np.array(data, dtype=float)

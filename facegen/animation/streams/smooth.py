@@ -23,7 +23,7 @@ Array = NDArray[np.float64]
 # After a gap longer than this, in seconds, what was before says nothing of what is now: the filter starts anew.
 _FORGOTTEN = 0.5
 # Angles and millimetres are this many times what weights are: the speed term is made for weights a second.
-_PER_WEIGHT = {"weights": 1.0, "head": 30.0, "place": 100.0, "gaze": 25.0}
+PER_WEIGHT = {"weights": 1.0, "head": 30.0, "place": 100.0, "gaze": 25.0}
 
 
 @dataclass(frozen=True)
@@ -74,13 +74,17 @@ def parse_smooth(text: str) -> OneEuro:
 def smoothed(one: Performance, euro: OneEuro | None = None) -> Performance:
     """Return a performance whose weights, head, place and gaze are filtered. Missing numbers stay missing."""
     euro = euro or OneEuro()
-    parts = {name: one_euro(one.times, values, euro, scale) for name, scale in _PER_WEIGHT.items()
-             if (values := getattr(one, name)) is not None}
+    found = {name: values for name in PER_WEIGHT if (values := getattr(one, name)) is not None}
+    widths = [values.shape[1] for values in found.values()]
+    scales = np.repeat([PER_WEIGHT[name] for name in found], widths)
+    together = one_euro(one.times, np.hstack(list(found.values())), euro, scales)
+    parts = dict(zip(found, np.split(together, np.cumsum(widths)[:-1], axis=1), strict=True))
     return replace(one, **parts, about={**one.about, "smooth": f"{euro.cutoff:g},{euro.beta:g}"})
 
 
-def one_euro(times: Array, values: Array, euro: OneEuro, scale: float = 1.0) -> Array:
-    """Return values (n, k) at times (n,) filtered, each column by itself. scale: what counts as a weight of 1."""
+def one_euro(times: Array, values: Array, euro: OneEuro, scale: float | Array = 1.0) -> Array:
+    """Return values (n, k) at times (n,) filtered, each column by itself. scale, or (k,): what counts as a weight of 1.
+    """
     result = np.array(values, dtype=float)
     state = Filter(euro, scale)
     for k, time in enumerate(times.tolist()):
@@ -91,7 +95,7 @@ def one_euro(times: Array, values: Array, euro: OneEuro, scale: float = 1.0) -> 
 class Filter:
     """One Euro filters for k numbers that come one frame after the other."""
 
-    def __init__(self, euro: OneEuro, scale: float = 1.0) -> None:
+    def __init__(self, euro: OneEuro, scale: float | Array = 1.0) -> None:
         self._euro, self._scale = euro, scale
         self._last: Array | None = None                 # what came out last
         self._speed = self._when = np.empty(0)

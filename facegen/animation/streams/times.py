@@ -29,7 +29,9 @@ def check_fps(fps: float | None) -> float | None:
 
 def counted(frames: NDArray[np.float64] | None, count: int, fps: float) -> NDArray[np.float64]:
     """Return the seconds (count,) of frames by their numbers, from the first; one after the other without numbers."""
-    return (np.arange(count) if frames is None else frames - np.nanmin(frames)) / fps
+    if frames is None or not np.isfinite(frames).any():
+        return np.arange(count) / fps
+    return (frames - np.nanmin(frames)) / fps
 
 
 def in_order(path: Path, times: NDArray[np.float64], lines: NDArray[np.int64]) -> tuple[NDArray[np.intp], list[str]]:
