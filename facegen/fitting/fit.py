@@ -76,8 +76,9 @@ def fit_markers(face: Rig, positions: ArrayLike, markers: Sequence[str] | Mappin
     if goals.shape[1] != len(places):
         raise InputError(f"positions: expected {len(places)} points a frame, one for each marker, got {goals.shape[1]}")
     rules = _rules(noise, sparsity, change, robust)
-    return _fitted(face, marker_rows(face, places), np.ones(len(places)), goals, Space(), wanted(face, shapes), rules,
-                   times, fps, neutral, scale, "markers")
+    want = wanted(face, shapes, dense=False)
+    return _fitted(face, marker_rows(face, places), np.ones(len(places)), goals, Space(), want, rules, times, fps,
+                   neutral, scale, "markers")
 
 
 def fit_landmarks(face: Rig, landmarks: ArrayLike, layout: str | Mapping[str, Any], *, camera: Camera | None = None,
@@ -103,8 +104,9 @@ def fit_landmarks(face: Rig, landmarks: ArrayLike, layout: str | Mapping[str, An
     goals = _frames("landmarks", landmarks, 3 if solid else 2)
     place, share, indices = layout_points(face, layout, goals.shape[1])
     rules = _rules((MARKER_NOISE if solid else PICTURE_NOISE) if noise is None else noise, sparsity, change, robust)
-    return _fitted(face, place, share, goals[:, indices], Space() if solid else _camera(camera), wanted(face, shapes),
-                   rules, times, fps, neutral, scale, layout if isinstance(layout, str) else "landmarks")
+    want = wanted(face, shapes, dense=False)
+    return _fitted(face, place, share, goals[:, indices], Space() if solid else _camera(camera), want, rules, times, fps,
+                   neutral, scale, layout if isinstance(layout, str) else "landmarks")
 
 
 def landmark_tracker(face: Rig, layout: str | Mapping[str, Any], *, camera: Camera | None = None,
@@ -116,7 +118,7 @@ def landmark_tracker(face: Rig, layout: str | Mapping[str, Any], *, camera: Came
     ``tracker.points.weights(state.x)`` are the weights of a step, by ``tracker.points.names``.
     """
     place, share, indices = layout_points(face, layout, None)
-    points = rig_points(face, place, wanted(face, shapes))
+    points = rig_points(face, place, wanted(face, shapes, dense=False))
     return Tracker(points, _camera(camera), share, _rules(noise, sparsity, change, robust)), indices
 
 

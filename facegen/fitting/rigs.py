@@ -34,7 +34,7 @@ class Wanted:
     columns: tuple[str, ...]
 
 
-def wanted(face: Rig, shapes: str | Sequence[str] | None = None) -> Wanted:
+def wanted(face: Rig, shapes: str | Sequence[str] | None = None, *, dense: bool = True) -> Wanted:
     """Return which weights of a rig to fit.
 
     shapes: a set ("units", "arkit", "visemes", "vrm", "expressions"), "shapes" for all of the file's own, or names; by
@@ -46,7 +46,7 @@ def wanted(face: Rig, shapes: str | Sequence[str] | None = None) -> Wanted:
             raise InputError(f"shapes: the parametric face '{face.name}' has no blendshapes, only units, got {shapes!r}"
                              "; make an avatar of it or leave this out")
         given = [shapes] if isinstance(shapes, str) else shapes
-        return _units(unit_atoms(None if shapes in (None, "units") else given))
+        return _units(unit_atoms(None if shapes in (None, "units") else given, dense=dense))
     by_set: dict[str, dict[str, str]] = {}                  # set -> shape -> the file's name of it
     for name, (shape, recipe) in face.known.items():
         by_set.setdefault(recipe.set, {})[shape.removeprefix(CLASH)] = name
@@ -65,7 +65,7 @@ def wanted(face: Rig, shapes: str | Sequence[str] | None = None) -> Wanted:
                          f"{', '.join(sorted(by_set)) or 'none that is known by name: take shapes'}")
     if shapes == "units":
         members = {member_of(shape) for shape in found}
-        return _units(tuple(atom for atom in unit_atoms() if atom in members))
+        return _units(tuple(atom for atom in unit_atoms(dense=dense) if atom in members))
     return Wanted(shapes, tuple(found), tuple(found.values()))
 
 

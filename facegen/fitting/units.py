@@ -26,6 +26,10 @@ Array = NDArray[np.float64]
 ALIKE = {"26": "27", "41": "43", "42": "43", "44": "43", "45": "43", "46": "43", "33": "34", "32": "28"}
 """Units that look like another one, by degree or by time, and are left out unless they are asked for."""
 
+RARE = ("11", "13", "19", "21", "32", "33", "35", "38", "39")
+"""Units that people seldom make, or that move most where no landmark lies (tongue, neck, nostrils): by few points they
+would only be taken for others, so they are left out unless a whole mesh is there or they are asked for."""
+
 GAZE = ("yaw", "pitch", "vergence")
 """Angles of both eyes, degrees: to the subject's left, up, and how far each turns outward."""
 
@@ -37,12 +41,14 @@ _WIDEST = 40.0          # degrees of an eye; people reach 35
 _CROSSED = 15.0
 
 
-def unit_atoms(wanted: Sequence[str] | None = None) -> tuple[str, ...]:
-    """Return the atoms that a fit looks for, by the table's order; wanted: codes such as "12", "L12" or "AU12_L"."""
+def unit_atoms(wanted: Sequence[str] | None = None, *, dense: bool = True) -> tuple[str, ...]:
+    """Return the atoms that a fit looks for, by the table's order; wanted: codes such as "12", "L12" or "AU12_L", else
+    all that make sense; dense: whether whole meshes are measured."""
     catalogue = load_units().catalogue
     if wanted is None:
+        out = (*ALIKE, *(() if dense else RARE))
         return tuple(atom for atom in catalogue.atoms if not is_head(atom)
-                     and catalogue.unit_of(atom).region != "eyes" and catalogue.unit_of(atom).number not in ALIKE)
+                     and catalogue.unit_of(atom).region != "eyes" and catalogue.unit_of(atom).number not in out)
     found = {atom for code in wanted for atom in catalogue.expand({member_of(code) or code.removeprefix("AU"): 1.0})}
     return tuple(atom for atom in catalogue.atoms if atom in found)
 
