@@ -104,9 +104,9 @@ def fit_landmarks(face: Rig, landmarks: ArrayLike, layout: str | Mapping[str, An
     goals = _frames("landmarks", landmarks, 3 if solid else 2)
     place, share, indices = layout_points(face, layout, goals.shape[1])
     rules = _rules((MARKER_NOISE if solid else PICTURE_NOISE) if noise is None else noise, sparsity, change, robust)
-    want = wanted(face, shapes, dense=False)
-    return _fitted(face, place, share, goals[:, indices], Space() if solid else _camera(camera), want, rules, times, fps,
-                   neutral, scale, layout if isinstance(layout, str) else "landmarks")
+    want, view = wanted(face, shapes, dense=False), Space() if solid else _camera(camera)
+    return _fitted(face, place, share, goals[:, indices], view, want, rules, times, fps, neutral, scale,
+                   layout if isinstance(layout, str) else "landmarks")
 
 
 def landmark_tracker(face: Rig, layout: str | Mapping[str, Any], *, camera: Camera | None = None,

@@ -67,7 +67,7 @@ def test_meshes_of_the_face_itself(run, tmp_path):
     np.savez(tmp_path / "take.npz", vertices=[face.pose("6C+12D"), face.pose("4D")])
     code, said, err = run("fit", tmp_path / "take.npz", "-o", tmp_path / "w.csv", "--fps", "50", "-q")
     assert (code, said, err) == (0, "", "")
-    found = load_performance(tmp_path / "w.csv", format="csv")
+    found = load_performance(tmp_path / "w.csv")
     assert found.column("L12")[0] == pytest.approx(0.8, abs=0.02)
     assert found.times.tolist() == [0.0, 0.02]
 
