@@ -108,6 +108,8 @@ def _warnings(found: Track, seen: Observed, off: Array, view: View, rules: Rules
     lost = [k for k, state in enumerate(found.states) if state is None]
     if lost:
         said.append(f"{len(lost)} of {len(off)} frames have too few points and stay empty, the first is {lost[0]}")
+    if found.unsettled:
+        said.append(f"{found.unsettled} points are missing in the neutral frames and rest where the rig's do")
     if seen.unseen:
         said.append(f"no point sees {', '.join(seen.unseen)}: not fitted")
     if seen.unsure:

@@ -128,12 +128,13 @@ def own_shape(points: Points, view: View, goals: Array, share: Array, rules: Rul
 
 @dataclass(frozen=True, eq=False)
 class Track:
-    """``states``: of each frame, or None; ``points``, ``view``: what they are states of."""
+    """``states``: of each frame, or None; ``points``, ``view``: what they are states of; ``unsettled``: how many points
+    no neutral frame shows, so that they rest where the rig's do."""
 
     states: tuple[State | None, ...]
     points: Points
     view: View
-    zoom: float | None
+    unsettled: int = 0
 
 
 def track(points: Points, view: View, goals: Array, share: Array, times: Array, rules: Rules, *,
@@ -146,9 +147,11 @@ def track(points: Points, view: View, goals: Array, share: Array, times: Array, 
     if isinstance(view, Space):
         zoom = head_scale(points, goals, share, rules) if scale is None else scale
         view = fixed(view, False)
+    unsettled = 0
     if len(neutral):
-        points, _ = own_shape(points, view, goals, share, rules, neutral, zoom)
+        points, settled = own_shape(points, view, goals, share, rules, neutral, zoom)
+        unsettled = int((~settled & np.isfinite(goals).all(axis=2).any(axis=0)).sum())
     tracker = Tracker(points, view, share, rules, zoom)
     steps = np.diff(times, prepend=times[0])
-    return Track(tuple(tracker.step(goal, float(step)) for goal, step in zip(goals, steps, strict=True)), points, view,
-                 zoom)
+    states = tuple(tracker.step(goal, float(step)) for goal, step in zip(goals, steps, strict=True))
+    return Track(states, points, view, unsettled)

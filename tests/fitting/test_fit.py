@@ -181,6 +181,9 @@ def test_another_persons_rest_is_no_expression(avatar, performed, drawn):
                                names) - weights) ** 2)) for neutral in ((), (0,))]
     assert off[1] < 0.06
     assert off[1] < 0.5 * off[0]
+    points[0, 20:22] = np.nan
+    found = fit_landmarks(avatar, points, "ibug68", camera=camera, neutral=(0,)).performance
+    assert any("2 points are missing in the neutral frames" in said for said in found.warnings)
     meshes = fit_meshes(avatar, wide, neutral=[0]).performance
     assert np.sqrt(np.mean((of(meshes, names) - weights) ** 2)) < 0.05
 
