@@ -57,6 +57,32 @@ def avatars() -> NDArray[np.uint8]:
     return np.concatenate(rows, axis=0)
 
 
+def layouts() -> NDArray[np.uint8]:
+    """Return where the points of the landmark layouts lie on the base face and on the shipped avatars, row by row."""
+    from facegen.fitting.fit import layout_points
+    from facegen.geometry.camera import frame
+
+    rows = []
+    with tempfile.TemporaryDirectory() as folder:
+        faces = [FACE]
+        for name in ("human", "cartoon", "cat"):
+            rig(name, f"{folder}/{name}.glb", sets=["arkit"])
+            faces.append(load_face(f"{folder}/{name}.glb"))
+        for layout, pose in (("ibug68", {"27": 0.6}), ("mediapipe478", {"12": 0.5})):
+            drawn = []
+            for face in faces:
+                neutral, posed = face.mesh().vertices, face.pose(pose)
+                near = slice(None) if getattr(face, "focus", None) is None else face.focus
+                camera = frame(neutral[near], posed[near], size=(SIZE, SIZE))
+                picture = Image.fromarray(render(face, pose, size=SIZE)[..., :3])
+                pen = ImageDraw.Draw(picture)
+                for x, y, _ in camera.project(layout_points(face, layout, None)[0] @ posed):
+                    pen.ellipse((x - 1.6, y - 1.6, x + 1.6, y + 1.6), fill=(235, 40, 40))
+                drawn.append(np.asarray(picture))
+            rows.append(strip(drawn))
+    return np.concatenate(rows)
+
+
 if __name__ == "__main__":
     IMAGES.mkdir(exist_ok=True)
     run("gallery", "-o", IMAGES)
@@ -69,6 +95,7 @@ if __name__ == "__main__":
                IMAGES / "shadows.webp")
     save_image(pass_strip(), IMAGES / "passes.webp")
     save_image(avatars(), IMAGES / "avatars.webp")
+    save_image(layouts(), IMAGES / "layouts.webp")
     with tempfile.TemporaryDirectory() as folder:
         run("figures", "-o", folder, "--size", 256)
         for face in ("akimoto-1986", "akimoto"):

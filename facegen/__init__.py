@@ -35,6 +35,9 @@ if TYPE_CHECKING:
     from facegen.fileio.avatar import AvatarFile, load_avatar, save_avatar
     from facegen.fileio.images import contact_sheet, save_image
     from facegen.fileio.video import save_video
+    from facegen.fitting.files import fit_files
+    from facegen.fitting.fit import Fitted, fit_landmarks, fit_markers, fit_meshes
+    from facegen.fitting.views import Pinhole, WeakCamera
     from facegen.geometry.mesh import Mesh
     from facegen.jobs.adopting import adopt
     from facegen.jobs.batch import run_batch
@@ -56,17 +59,20 @@ __all__ = [
     "Face",
     "FacegenError",
     "FileError",
+    "Fitted",
     "InputError",
     "JobError",
     "Live",
     "Mesh",
     "NotationError",
     "Performance",
+    "Pinhole",
     "Playback",
     "Recipe",
     "Renderer",
     "Resolution",
     "TableError",
+    "WeakCamera",
     "Wireframe",
     "adopt",
     "avatar_names",
@@ -74,6 +80,10 @@ __all__ = [
     "contact_sheet",
     "convert",
     "face_names",
+    "fit_files",
+    "fit_landmarks",
+    "fit_markers",
+    "fit_meshes",
     "load_avatar",
     "load_clip",
     "load_deformation",
@@ -121,6 +131,9 @@ _HOMES = {
     "facegen.fileio.avatar": ("AvatarFile", "load_avatar", "save_avatar"),
     "facegen.fileio.images": ("contact_sheet", "save_image"),
     "facegen.fileio.video": ("save_video",),
+    "facegen.fitting.files": ("fit_files",),
+    "facegen.fitting.fit": ("Fitted", "fit_landmarks", "fit_markers", "fit_meshes"),
+    "facegen.fitting.views": ("Pinhole", "WeakCamera"),
     "facegen.geometry.mesh": ("Mesh",),
     "facegen.jobs.adopting": ("adopt",),
     "facegen.jobs.batch": ("run_batch",),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -33,6 +33,14 @@ class Attachment:
     eye: int | None = None
     centre: Array | None = None
     points: tuple[tuple[int, Array], ...] = ()
+
+    def some(self, rows: NDArray[np.int64]) -> Attachment:
+        """Return the same for some of its vertices, without triangles."""
+        mesh = replace(self.mesh, vertices=self.mesh.vertices[rows], faces=self.mesh.faces[:0],
+                       face_materials=self.mesh.face_materials[:0], face_parts=self.mesh.face_parts[:0], colours=None)
+        return Attachment(mesh, None if self.skin is None else self.skin[rows],
+                          None if self.jaw is None else self.jaw[rows], self.eye, self.centre,
+                          tuple((point, weight[rows]) for point, weight in self.points))
 
     def move(self, moved_cage: Array, controls: Controls, deformer: Deformer) -> Array:
         """Return the part's vertices (..., n, 3), mm, before the head turns.

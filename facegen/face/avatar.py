@@ -105,7 +105,15 @@ class AvatarFace:
         vertices = np.asarray(vertices, np.float64)
         if vertices.shape != self._mesh.vertices.shape:
             raise InputError(f"vertices: expected shape {self._mesh.vertices.shape}, got {vertices.shape}")
-        return dict(zip(self.landmarks, self._landmark_weights @ vertices, strict=True))
+        return dict(zip(self.landmarks, self.landmark_weights() @ vertices, strict=True))
+
+    def landmark_weights(self) -> sparse.csr_array:
+        """Return the weights (k, n) of the vertices of ``mesh()`` that place the landmarks; kept."""
+        return self._landmarks_on
+
+    def motion(self, name: str) -> Array:
+        """Return how the vertices (n, 3), mm, move in a shape of the file."""
+        return self._motion[:, [self._places[name]]].toarray().reshape(-1, 3)
 
     @cached_property
     def known(self) -> dict[str, tuple[str, Recipe]]:
@@ -274,10 +282,10 @@ class AvatarFace:
         return sparse.csr_array((np.concatenate(values), (np.concatenate(rows), columns)), shape=shape)
 
     @cached_property
-    def _landmark_weights(self) -> sparse.csr_array:
-        return placing(self.notes, self._mesh, self._opened)
+    def _landmarks_on(self) -> sparse.csr_array:
+        return placing(self.notes, self._mesh, self.opened)
 
-    def _opened(self) -> Array | None:
+    def opened(self) -> Array | None:
         """Return how the vertices move when the jaw opens, mm, or None if no shape does that."""
         weights, left = self._made_of.read_off({_WIDEST: 1.0}) if self.known else ({}, {_WIDEST: 1.0})
         if left:

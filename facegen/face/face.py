@@ -73,13 +73,31 @@ class Controls:
 
 @dataclass(frozen=True, eq=False)
 class _Level:
-    """What is constant at one level of detail."""
+    """What is constant at one level of detail, or of some of its vertices."""
 
     matrix: sparse.csr_array            # surface vertices from cage vertices
-    mesh: Mesh                          # neutral, all parts
+    neutral: Array                      # (n, 3), all parts
     lid_vertices: tuple[NDArray[np.int64], ...]
     folds: Array                        # (f, n_surface, 3) displacement at amount one
     head_weight: Array                  # (n, 1)
+    relief: Array | None                # (n_surface, 3), what the surface has beyond its cage
+    attachments: tuple[Attachment, ...]
+
+    def some(self, vertices: NDArray[np.int64]) -> _Level:
+        """Return the same for some vertices alone, ascending."""
+        n = self.matrix.shape[0]
+        skin = vertices[vertices < n]
+        places = np.full(n, -1)
+        places[skin] = np.arange(len(skin))
+        lids = tuple(found[found >= 0] for found in (places[rows] for rows in self.lid_vertices))
+        parts = []
+        for a in self.attachments:
+            size = len(a.mesh.vertices)
+            rows = vertices[(vertices >= n) & (vertices < n + size)] - n
+            parts += [a.some(rows)] if len(rows) else []
+            n += size
+        return _Level(self.matrix[skin], self.neutral[vertices], lids, self.folds[:, skin], self.head_weight[vertices],
+                      None if self.relief is None else self.relief[skin], tuple(parts))
 
 
 class Face:
@@ -90,6 +108,7 @@ class Face:
         self.name = data.name
         self.deformer: Deformer = data.deformer
         self._levels: dict[int, _Level] = {}
+        self._meshes: dict[int, Mesh] = {}
         self._points_on: dict[int, sparse.csr_array] = {}       # worked out when asked for, by detail
         self._landmarks_on: dict[int, sparse.csr_array] = {}
 
@@ -165,7 +184,8 @@ class Face:
 
     def mesh(self, detail: int = 2) -> Mesh:
         """Return the neutral face at a subdivision level, 0 (the cage's own triangles) to 3."""
-        return self._level(detail).mesh
+        self._level(detail)
+        return self._meshes[detail]
 
     # -- poses --------------------------------------------------------------------------------------------------
     def pose(self, what: Any = "neutral", *, person: Any = None, intensity: float = 1.0, detail: int = 2) -> Array:
@@ -226,50 +246,55 @@ class Face:
                 raise InputError(f"folds: {name!r} is no fold of the face {self.name!r}{nearest(name, d.folds)}")
         return Controls(vectors, jaw, lids, eyes, head, np.array([deformation.folds.get(k, 0.0) for k in d.folds]))
 
-    def finished_controls(self, linear: Controls, turning: Sequence[int] = ()) -> Controls:
-        """Return the deformer's input for a sum of `linear_controls`: lids follow the gaze, folds end.
+    def finished_controls(self, linear: Controls, turning: Sequence[int] | NDArray[np.bool_] = ()) -> Controls:
+        """Return the deformer's input for a sum of `linear_controls`, or a batch: lids follow the gaze, folds end.
 
-        turning: rows of feature points that turn with the jaw in this pose though they need not.
+        turning: rows of feature points that turn with the jaw in this pose though they need not, or which (..., k) do.
         """
-        d = self._data
-        vectors, lids = linear.vectors, linear.lids
-        turning = [row for row in turning if not self.deformer.jaw_share[row]]
-        if turning:
-            vectors = vectors.copy()
-            for row in turning:
-                vectors[row] += self.deformer.jaw.movement(self.deformer.points[[row]], linear.jaw)[0]
+        d, vectors, lids = self._data, linear.vectors, linear.lids
+        turns = np.array(turning)
+        if turns.dtype != bool:
+            turns = np.isin(np.arange(len(d.point_names)), turns)
+        turns &= self.deformer.jaw_share == 0.0
+        if turns.any():
+            vectors = vectors + turns[..., None] * self.deformer.jaw.movement(self.deformer.points, linear.jaw)
         if linear.eyes.any():
             lids = lids.copy()
-            for i, pitch in enumerate(linear.eyes[[1, 3]]):     # lids follow the gaze as far as they are open
-                pair = slice(2 * i, 2 * i + 2)
-                openness = 1.0 - np.clip(lids[pair].sum(), 0.0, 1.0)
-                lids[pair] += d.lid_follow[int(pitch > 0)] * abs(pitch) * openness
+            for i in range(2):                              # lids follow the gaze as far as they are open
+                pair, pitch = lids[..., 2 * i: 2 * i + 2], linear.eyes[..., 2 * i + 1, None]
+                openness = 1.0 - np.clip(pair.sum(axis=-1, keepdims=True), 0.0, 1.0)
+                pair += np.where(pitch > 0, d.lid_follow[1], d.lid_follow[0]) * np.abs(pitch) * openness
         # Folds saturate: two units that crease the same skin do not crease it twice as deep.
         folds = np.minimum(linear.folds, DEEPEST_FOLD)
         return Controls(vectors, linear.jaw, lids, linear.eyes, linear.head, folds)
 
     def pose_controls(self, controls: Controls, *, detail: int = 2) -> Array:
         """Return vertices (..., n, 3), mm, of ``mesh(detail)`` for (a batch of) controls."""
-        d, level = self._data, self._level(detail)
-        batch = controls.vectors.shape[:-2]
+        return self._posed(self._level(detail), controls)
+
+    def some_posed(self, vertices: NDArray[np.int64], *, detail: int = 2) -> Callable[[Controls], Array]:
+        """Return what `pose_controls` would give for some vertices (k,) of ``mesh(detail)``, ascending: a function of
+        controls, made once, that costs what they cost."""
+        level = self._level(detail).some(np.asarray(vertices))
+        return lambda controls: self._posed(level, controls)
+
+    def _posed(self, level: _Level, controls: Controls) -> Array:
+        d, batch = self._data, controls.vectors.shape[:-2]
         if not any(np.any(part) for part in vars(controls).values()):
-            return np.broadcast_to(level.mesh.vertices, (*batch, *level.mesh.vertices.shape)).copy()
+            return np.broadcast_to(level.neutral, (*batch, *level.neutral.shape)).copy()
         cage = self.deformer.deform(controls.vectors, controls.jaw, controls.lids)
         flat = np.moveaxis(cage.reshape(-1, *cage.shape[-2:]), 0, 1).reshape(cage.shape[-2], -1)
         skin = np.moveaxis((level.matrix @ flat).reshape(level.matrix.shape[0], -1, 3), 1, 0)
         skin = np.ascontiguousarray(skin).reshape(*batch, -1, 3)
-        if d.relief is not None:
-            skin += d.relief[:skin.shape[-2]]
+        if level.relief is not None:
+            skin += level.relief
         if len(d.folds) and np.any(controls.folds):
             skin += np.einsum("...f,fni->...ni", controls.folds, level.folds)
         for i, (centre, rows) in enumerate(zip(d.eye_centres, level.lid_vertices, strict=True)):
             self._rest_on_eyeball(skin, rows, centre, controls.eyes[..., 2 * i: 2 * i + 2])
-        pieces = [skin]
         moved_cage = cage - self.deformer.neutral
-        for a in d.attachments:
-            pieces.append(a.move(moved_cage, controls, self.deformer))
-        vertices = np.concatenate(pieces, axis=-2)
-        return turn_head(vertices, controls.head, d.head_pivot, level.head_weight)
+        pieces = [skin, *(a.move(moved_cage, controls, self.deformer) for a in level.attachments)]
+        return turn_head(np.concatenate(pieces, axis=-2), controls.head, d.head_pivot, level.head_weight)
 
     def _lengths(self, units: str) -> tuple[Array, Array]:
         """Return the millimetres of a unit of length: at each feature point (k, 3), and of the jaw and head (3,)."""
@@ -364,7 +389,10 @@ class Face:
         mesh = merge([skin, *(a.mesh for a in d.attachments)])
         normals = vertex_normals(neutral, faces)
         folds = np.array([fold_field(f, neutral, normals) for f in d.folds.values()]).reshape(len(d.folds), n, 3)
-        return _Level(matrix, mesh, tuple(lids), folds, d.head_weight(mesh.vertices))
+        self._meshes[detail] = mesh
+        relief = None if d.relief is None else d.relief[:n]
+        return _Level(matrix, mesh.vertices, tuple(lids), folds, d.head_weight(mesh.vertices), relief,
+                      tuple(d.attachments))
 
     def landmark_weights(self, detail: int = 2) -> sparse.csr_array:
         """Return the weights (k, n) of the vertices of ``mesh(detail)`` that place the landmarks; kept."""
