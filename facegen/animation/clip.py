@@ -22,6 +22,7 @@ from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from functools import cache, cached_property
 from types import MappingProxyType
+from typing import Protocol
 
 from facegen.animation.easing import DEFAULT_EASE, EASES, eased
 from facegen.animation.idle import Idle
@@ -30,6 +31,7 @@ from facegen.facs.deformation import Deformation, weighted_sum
 from facegen.facs.expressions import Resolution
 from facegen.facs.tables import load_units
 from facegen.facs.units import split_code
+from facegen.fileio.sound import Sound
 
 LOWEST_FPS, HIGHEST_FPS = 0.1, 1000.0
 MOST_FRAMES = 99_999
@@ -139,6 +141,19 @@ class Track:
         return max([key.t for key in self.keyframes] + [event.end for event in self.events])
 
     @property
+    def begins(self) -> float:
+        """When the last keyframe stands or the last event begins, seconds."""
+        return max([key.t for key in self.keyframes] + [event.at for event in self.events])
+
+    @property
+    def corners(self) -> tuple[float, ...]:
+        """The times at which movements begin and end, seconds."""
+        found = [key.t for key in self.keyframes]
+        for one in self.events:
+            found += (one.at, one.at + one.onset, one.at + one.onset + one.apex, one.end)
+        return tuple(found)
+
+    @property
     def poses(self) -> tuple[Pose, ...]:
         """Every pose in it."""
         return tuple(one.pose for one in (*self.keyframes, *self.events))
@@ -146,6 +161,16 @@ class Track:
     @cached_property
     def _times(self) -> tuple[float, ...]:
         return tuple(key.t for key in self.keyframes)
+
+    def mirrored(self) -> Track:
+        """Return the track with left and right changed."""
+        return replace(self, keyframes=tuple(replace(key, pose=key.pose.mirrored()) for key in self.keyframes),
+                       events=tuple(replace(event, pose=event.pose.mirrored()) for event in self.events),
+                       replaces=self.replaces if self.replaces == "all" else frozenset(map(_mirrored, self.replaces)))
+
+    def fades(self, t: float) -> list[tuple[str | frozenset[str], float]]:
+        """Return which atoms below fade at a time, or "all", and to what share."""
+        return [(self.replaces, 1.0 - min(1.0, sum(share for share, _ in self.shares(t))))]
 
     def shares(self, t: float) -> list[tuple[float, Pose]]:
         """Return the poses that are there at a time, each with its strength 0..1."""
@@ -162,20 +187,53 @@ class Track:
         return [(share, pose) for share, pose in ((1.0 - done, here.pose), (done, there.pose)) if share > 0.0]
 
 
+class Layer(Protocol):
+    """What a clip is laid of: a `Track`, or speech (`facegen.animation.coarticulation.SpeechTrack`)."""
+
+    name: str
+
+    @property
+    def end(self) -> float:
+        """When it is over, seconds."""
+
+    @property
+    def begins(self) -> float:
+        """When the last thing in it begins, seconds."""
+
+    @property
+    def corners(self) -> tuple[float, ...]:
+        """Times that show how far it reaches, seconds."""
+
+    @property
+    def poses(self) -> tuple[Pose, ...]:
+        """Every pose in it."""
+
+    def shares(self, t: float) -> list[tuple[float, Pose]]:
+        """Return the poses that are there at a time, each with its strength 0..1."""
+
+    def fades(self, t: float) -> list[tuple[str | frozenset[str], float]]:
+        """Return which atoms below fade at a time, or "all", and to what share."""
+
+    def mirrored(self) -> Layer:
+        """Return the same with left and right changed."""
+
+
 @dataclass(frozen=True)
 class Clip:
     """Timed poses in tracks, ``duration`` seconds long; make one with `load_clip` or `morph`.
 
-    ``warnings``: what its poses were warned of. ::
+    ``warnings``: what its poses were warned of. ``sound``: what is heard meanwhile, from the first moment on; films
+    that can have sound get it. ::
 
         for pose in clip.sample(25):
             pixels = renderer.draw(pose)
     """
 
-    tracks: tuple[Track, ...]
+    tracks: tuple[Layer, ...]
     duration: float
     idle: Idle | None = None
     warnings: tuple[str, ...] = ()
+    sound: Sound | None = None
 
     def __post_init__(self) -> None:
         if isinstance(self.duration, bool) or not isinstance(self.duration, numbers.Real) \
@@ -228,7 +286,7 @@ class Clip:
 
     def mirrored(self) -> Clip:
         """Return the clip with left and right changed; the idle layer is left as it is."""
-        return replace(self, tracks=tuple(map(_mirrored_track, self.tracks)))
+        return replace(self, tracks=tuple(track.mirrored() for track in self.tracks))
 
     @property
     def raw(self) -> tuple[Deformation, ...]:
@@ -240,9 +298,7 @@ class Clip:
         """The times at which movements begin and end, seconds, each once."""
         found = {0.0, self.duration}
         for track in self.tracks:
-            found.update(key.t for key in track.keyframes)
-            for one in track.events:
-                found.update((one.at, one.at + one.onset, one.at + one.onset + one.apex, one.end))
+            found.update(track.corners)
         return tuple(sorted(t for t in found if t <= self.duration))
 
     def _mixed(self, t: float) -> tuple[dict[str, float], list[tuple[float, Deformation]]]:
@@ -256,12 +312,12 @@ class Clip:
             shares = track.shares(t)
             if not shares:
                 continue
-            kept = 1.0 - min(1.0, sum(share for share, _ in shares))
-            if track.replaces == "all":
-                atoms = {atom: weight * kept for atom, weight in atoms.items()}
-                raw = [(share * kept, one) for share, one in raw if kept]
-            else:
-                atoms.update((atom, atoms[atom] * kept) for atom in track.replaces if atom in atoms)
+            for which, kept in track.fades(t):
+                if which == "all":
+                    atoms = {atom: weight * kept for atom, weight in atoms.items()}
+                    raw = [(share * kept, one) for share, one in raw if kept]
+                else:
+                    atoms.update((atom, atoms[atom] * kept) for atom in which if atom in atoms)
             mine = [(share, pose.raw) for share, pose in shares if pose.raw is not None]
             beyond = max(1.0, math.fsum(share for share, _ in mine))
             raw += [(share / beyond, one) for share, one in mine]
@@ -304,12 +360,6 @@ def _add(atoms: dict[str, float], shares: Sequence[tuple[float, Pose]]) -> None:
 def _mirrored(atom: str) -> str:
     mark, number = split_code(atom)
     return {"L": "R", "R": "L"}.get(mark, mark) + _MIRROR.get(number, number)
-
-
-def _mirrored_track(track: Track) -> Track:
-    return replace(track, keyframes=tuple(replace(key, pose=key.pose.mirrored()) for key in track.keyframes),
-                   events=tuple(replace(event, pose=event.pose.mirrored()) for event in track.events),
-                   replaces=track.replaces if track.replaces == "all" else frozenset(map(_mirrored, track.replaces)))
 
 
 def _check_time(name: str, value: object) -> None:

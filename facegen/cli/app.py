@@ -11,7 +11,7 @@ from typing import Annotated
 import typer
 
 from facegen import __version__
-from facegen.cli import batch, explain, figures, film, gallery, listing, picture
+from facegen.cli import batch, explain, figures, film, gallery, listing, phoneme, picture, speak
 from facegen.cli import rig as rigging
 from facegen.errors import FacegenError, InputError
 
@@ -33,6 +33,8 @@ app.command("animate")(film.animate)
 app.command("morph")(film.morph)
 app.command("turntable")(film.turntable)
 app.command("rig")(rigging.rig)
+app.command("speak")(speak.speak)
+app.command("phoneme")(phoneme.phoneme)
 
 
 def _version(asked: bool) -> None:

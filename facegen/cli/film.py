@@ -55,7 +55,7 @@ def animate(script: Annotated[Path, typer.Argument(metavar="SCRIPT", help="A cli
     For example: facegen animate greeting.yaml -o greeting.mp4. A stopped run goes on where it was when the same
     command is given again.
     """
-    out = _target(output)
+    out = film_target(output)
     from facegen.animation.script import load_clip
 
     clip = load_clip(script, person=person, idle=idle)
@@ -77,7 +77,7 @@ def morph(poses: Annotated[list[str], typer.Argument(
 
     For example: facegen morph happiness anger -o morph.gif
     """
-    out = _target(output)
+    out = film_target(output)
     from facegen.animation.script import morph as between
 
     found = [read_what(pose, person=person, intensity=1.0, quiet=True) for pose in poses]
@@ -99,7 +99,7 @@ def turntable(what: What, output: Out = None, seconds: Seconds = 4.0,
 
     For example: facegen turntable happiness -o turn.webp
     """
-    out = _target(output)
+    out = film_target(output)
     yaws = _yaws(turn)
     pixels, ground = read_size(size), read_background(background)
     meaning = read_what(what, person=person, intensity=intensity, quiet=quiet, face=face)
@@ -118,19 +118,26 @@ def turntable(what: What, output: Out = None, seconds: Seconds = 4.0,
 def _film(clip: Clip, out: Path, *, fps: float, size: str, view: str, renderer: str, face: str, background: str,
           detail: int | None, workers: int | None, json: bool, quiet: bool, about: dict[str, Any]) -> None:
     """Draw a clip with a progress bar, and tell of it."""
+    if not quiet:
+        warn(clip.warnings)
+    made = draw_film(clip, out, fps=fps, size=size, view=view, renderer=renderer, face=face, background=background,
+                     detail=detail, workers=workers, quiet=quiet)
+    if json:
+        print_json({"file": made.pop("file"), **about, **made, "warnings": list(clip.warnings)})
+
+
+def draw_film(clip: Clip, out: Path, *, fps: float, size: str, view: str, renderer: str, face: str, background: str,
+              detail: int | None, workers: int | None, quiet: bool) -> dict[str, Any]:
+    """Draw a clip with a progress bar and return what was done, as plain data."""
     angles, pixels, ground = read_view(view), read_size(size), read_background(background)
     count = clip.frames(fps)
     from facegen.jobs.frames import save_clip
 
-    if not quiet:
-        warn(clip.warnings)
     report = _drawn(count, quiet, lambda step: save_clip(
         clip, out, fps=fps, size=pixels, view=angles, face=face, detail=detail, background=ground, renderer=renderer,
         workers=_count(workers), step=step))
-    if json:
-        print_json({"file": str(out), **about, "duration": clip.duration, "fps": fps, "frames": count,
-                    "size": list(pixels), "view": list(angles), "face": face, "made": report.made,
-                    "kept": report.kept, "warnings": list(clip.warnings)})
+    return {"file": str(out), "duration": clip.duration, "fps": fps, "frames": count, "size": list(pixels),
+            "view": list(angles), "face": face, "made": report.made, "kept": report.kept}
 
 
 def _drawn(count: int, quiet: bool, draw: Callable[[Callable[[], None]], Report]) -> Report:
@@ -138,7 +145,8 @@ def _drawn(count: int, quiet: bool, draw: Callable[[Callable[[], None]], Report]
         return draw(step)
 
 
-def _target(output: Path | None) -> Path:
+def film_target(output: Path | None) -> Path:
+    """Return where a film goes, or raise InputError."""
     if output is None:
         raise InputError("-o: say where the film goes, for example -o film.mp4")
     return output

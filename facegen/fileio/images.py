@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import os
+import unicodedata
 from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -114,6 +116,34 @@ def contact_sheet(images: Sequence[ArrayLike], labels: Sequence[str], columns: i
         sheet.paste(Image.fromarray(over_colour(picture, _PAPER)), (left, top))
         text, font = _fitted(str(label), letters, width)
         draw.text((left + width / 2, top + height + strip / 2), text, fill=_INK, font=font, anchor="mm")
+    return np.asarray(sheet).copy()
+
+
+# Fonts that have the letters of the IPA, where a system has them; Pillow's own font has little more than ASCII.
+_FONTS = ("DejaVuSans.ttf", "NotoSans-Regular.ttf", "Arial.ttf", "segoeui.ttf")
+
+
+def captioned(picture: ArrayLike, text: str, height: int) -> NDArray[np.uint8]:
+    """Return a picture (h + height, w, 3) with a line of text below it on white.
+
+    Letters beyond ASCII are drawn where the system has a font with them, else without their accents or left out.
+    """
+    from PIL import Image, ImageDraw, ImageFont
+
+    pixels = over_colour(check_pixels(picture), _PAPER)
+    sheet = Image.new("RGB", (pixels.shape[1], pixels.shape[0] + height), _PAPER)
+    sheet.paste(Image.fromarray(pixels), (0, 0))
+    letters, room, font = round(0.62 * height), pixels.shape[1] - height, None
+    for name in _FONTS:
+        with suppress(OSError):
+            font = ImageFont.truetype(name, letters)
+            while font.size > 7 and font.getlength(text) > room:
+                font = ImageFont.truetype(name, font.size - 1)
+            break
+    if font is None:
+        text = unicodedata.normalize("NFKD", text).encode("ascii", "ignore").decode()
+        text, font = _fitted(text, letters, room)
+    ImageDraw.Draw(sheet).text((height / 2, pixels.shape[0] + height / 2), text, fill=_INK, font=font, anchor="lm")
     return np.asarray(sheet).copy()
 
 

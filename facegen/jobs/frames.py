@@ -30,6 +30,7 @@ from facegen.facs.deformation import Deformation
 from facegen.facs.expressions import Resolution, resolve
 from facegen.facs.yamlfile import read_data
 from facegen.fileio.images import without_full_alpha, write_whole
+from facegen.fileio.sound import Sound
 from facegen.fileio.textfile import make_folder, save_text
 from facegen.fileio.video import FORMATS, check_film, save_video
 from facegen.geometry.camera import Camera, check_view, frame
@@ -128,7 +129,9 @@ def save_clip(clip: Clip, path: str | os.PathLike[str], *, fps: float = 25.0, si
     target = _Target(Path(path), size, fps)
     head = portrait(rig, mesh.vertices)
     camera = frame(head, _reach(rig, clip, frame(head, size=size, view=view)), size=size, view=view)
-    return target.fill(Shot(clip, float(fps), count, name, level, background, chosen, (camera,)), workers, step)
+    silent = replace(clip, sound=None)      # frames do not depend on it, and workers need not have it
+    shot = Shot(silent, float(fps), count, name, level, background, chosen, (camera,))
+    return target.fill(shot, workers, step, sound=clip.sound)
 
 
 def save_turn(what: Any, path: str | os.PathLike[str], *, seconds: float = 4.0, fps: float = 25.0,
@@ -221,8 +224,8 @@ class _Target:
             raise FileError(f"{path}: holds frames that facegen did not make here; choose another folder or remove "
                             "them")
 
-    def fill(self, shot: Shot, workers: int, step: Callable[[], None] | None) -> Report:
-        """Draw what is missing and put the film together."""
+    def fill(self, shot: Shot, workers: int, step: Callable[[], None] | None, *, sound: Sound | None = None) -> Report:
+        """Draw what is missing and put the film together, with a sound if its kind can have one."""
         self._open(shot)
         paths = [self.folder / f"frame_{k:05d}.png" for k in range(1, shot.frames + 1)]
         tasks = [FrameTask(shot, k, path, shot.fingerprint) for k, path in enumerate(paths)]
@@ -230,7 +233,8 @@ class _Target:
             warm(shot.renderer, coloured=load_face(shot.face).mesh(shot.detail).colours is not None)
         report = run(tasks, workers=workers, step=step)
         if self.is_film:
-            save_video(_Frames(paths), self.path, fps=self.fps)
+            heard = sound if FORMATS[self.path.suffix.lower()].sound else None
+            save_video(_Frames(paths), self.path, fps=self.fps, sound=heard)
             shutil.rmtree(self.folder, ignore_errors=True)
         return report
 

@@ -59,6 +59,7 @@ MATERIALS: Mapping[str, Material] = MappingProxyType({
     "gums": Material((176, 92, 88), 0.12, 40.0, _WET_WRAP, lift=0.3),
     "tongue": Material((186, 96, 92), 0.10, 30.0, _WET_WRAP, lift=0.12),
     "mouth": Material((92, 34, 30), 0.05, 30.0, lift=0.5),
+    "flesh": Material((222, 158, 140), 0.0, 10.0, (0.3, 0.3, 0.3)),      # the cut of facegen.geometry.section
 })
 
 # A material name that the scene does not know is drawn in plain clay.
