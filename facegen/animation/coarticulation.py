@@ -194,10 +194,10 @@ class _Scores:
             logs = np.log(alpha) - away
         soft = np.exp(logs - logs.max())
         must = self.musts(channel, np.array([t]), rows)[0]
-        certain = must.sum()
-        if certain > 1.0:
-            must, certain = must / certain, 1.0
-        return rows, must + (1.0 - certain) * soft / soft.sum()
+        # By odds, so that in the middle of one the ramps of its neighbours count nothing.
+        certain, odds = 1.0 - float(np.prod(1.0 - must)), must / (1.0 - must + _TINY * _TINY)
+        shares = (1.0 - certain) * soft / soft.sum()
+        return rows, shares + certain * odds / odds.sum() if certain else shares
 
     def musts(self, channel: int, times: Array, rows: NDArray[np.intp]) -> Array:
         """Return how far (n, k) what must be is there: 1 in the middle of its sound."""

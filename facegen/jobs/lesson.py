@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from facegen.animation.clip import Clip, frame_time
+from facegen.animation.clip import Clip
 from facegen.animation.coarticulation import SpeechTrack
 from facegen.animation.phonemes import Sound, read_sounds
 from facegen.animation.speech import Speech, TimedSound, parts_of, speech_of
@@ -108,8 +108,7 @@ def save_lesson(made: Lesson, path: str | os.PathLike[str], *, face: str | os.Pa
     clip = made.clip
 
     def frames() -> Iterator[NDArray[np.uint8]]:
-        for k in range(clip.frames(fps)):
-            t = frame_time(k, fps)
+        for t in clip.times(fps):
             yield views.draw(clip.at(t), made.caption(t))
             if step is not None:
                 step()
