@@ -22,7 +22,7 @@ from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from functools import cache, cached_property
 from types import MappingProxyType
-from typing import Protocol
+from typing import ClassVar, Protocol
 
 from facegen.animation.easing import DEFAULT_EASE, EASES, eased
 from facegen.animation.idle import Idle
@@ -45,6 +45,7 @@ _MIRROR |= {b: a for a, b in _MIRROR.items()}
 _TURNS = (("51", "52"), ("53", "54"), ("55", "56"), ("61", "62"))
 
 Weights = Mapping[str, float]
+_Shares = list[tuple[float, Deformation]]
 
 
 @dataclass(frozen=True)
@@ -126,6 +127,7 @@ class Track:
     keyframes: tuple[Keyframe, ...] = ()
     events: tuple[Event, ...] = ()
     replaces: str | frozenset[str] = frozenset()
+    optional: ClassVar[bool] = False
 
     def __post_init__(self) -> None:
         if bool(self.keyframes) == bool(self.events):
@@ -188,9 +190,13 @@ class Track:
 
 
 class Layer(Protocol):
-    """What a clip is laid of: a `Track`, or speech (`facegen.animation.coarticulation.SpeechTrack`)."""
+    """What a clip is laid of: a `Track`, or speech (`facegen.animation.coarticulation.SpeechTrack`).
+
+    optional: its raw data are left out on a face that lacks the points for them.
+    """
 
     name: str
+    optional: bool
 
     @property
     def end(self) -> float:
@@ -249,7 +255,7 @@ class Clip:
 
         It goes wherever a pose goes: ``renderer.draw(clip.at(1.5))``. Before 0 and after the end the clip holds.
         """
-        atoms, raw = self._mixed(t)
+        atoms, raw, optional = self._mixed(t)
         table = load_units()
         units = table.catalogue.fold(atoms)
         total = weighted_sum([(value, table.basis[name]) for name, value in table.coefficients(units).items()])
@@ -264,7 +270,7 @@ class Clip:
             sums = [weighted_sum(terms) for terms in of.values() if terms]
             total, more = sums[0], sums[1:]
         return Resolution(self, "units" if units or not raw else "deformation", f"{t:.3f} s", None, units, total,
-                          more=tuple(more))
+                          more=tuple(more), optional=(weighted_sum(optional),) if optional else ())
 
     def frames(self, fps: float) -> int:
         """Return how many frames the clip has: frame k shows the time k / fps. InputError if there are too many."""
@@ -291,7 +297,8 @@ class Clip:
     @property
     def raw(self) -> tuple[Deformation, ...]:
         """The raw data in its poses."""
-        return tuple(pose.raw for track in self.tracks for pose in track.poses if pose.raw is not None)
+        return tuple(pose.raw for track in self.tracks if not track.optional for pose in track.poses
+                     if pose.raw is not None)
 
     @property
     def corners(self) -> tuple[float, ...]:
@@ -301,13 +308,14 @@ class Clip:
             found.update(track.corners)
         return tuple(sorted(t for t in found if t <= self.duration))
 
-    def _mixed(self, t: float) -> tuple[dict[str, float], list[tuple[float, Deformation]]]:
-        """Return atom -> weight and shares of raw data at a time."""
+    def _mixed(self, t: float) -> tuple[dict[str, float], _Shares, _Shares]:
+        """Return atom -> weight, shares of raw data, and shares of those that are optional, at a time."""
         if isinstance(t, bool) or not isinstance(t, numbers.Real) or not math.isfinite(t):
             raise InputError(f"t: expected a time in seconds, got {t!r}")
         t = min(max(float(t), 0.0), self.duration)
         atoms: dict[str, float] = {}
-        raw: list[tuple[float, Deformation]] = []
+        raw: _Shares = []
+        optional: _Shares = []
         for track in self.tracks:
             shares = track.shares(t)
             if not shares:
@@ -315,12 +323,17 @@ class Clip:
             for which, kept in track.fades(t):
                 if which == "all":
                     atoms = {atom: weight * kept for atom, weight in atoms.items()}
-                    raw = [(share * kept, one) for share, one in raw if kept]
+                    raw, optional = ([(share * kept, one) for share, one in several if kept]
+                                     for several in (raw, optional))
                 else:
                     atoms.update((atom, atoms[atom] * kept) for atom in which if atom in atoms)
             mine = [(share, pose.raw) for share, pose in shares if pose.raw is not None]
             beyond = max(1.0, math.fsum(share for share, _ in mine))
-            raw += [(share / beyond, one) for share, one in mine]
+            mine = [(share / beyond, one) for share, one in mine]
+            if track.optional:
+                optional += mine
+            else:
+                raw += mine
             _add(atoms, shares)
         if self.idle is not None:
             _add(atoms, [(1.0, Pose(self.idle.at(t)))])
@@ -328,7 +341,7 @@ class Clip:
             if one in atoms and other in atoms:
                 both = min(atoms[one], atoms[other])
                 atoms[one], atoms[other] = atoms[one] - both, atoms[other] - both
-        return {atom: weight for atom, weight in atoms.items() if weight}, raw
+        return {atom: weight for atom, weight in atoms.items() if weight}, raw, optional
 
 
 @cache

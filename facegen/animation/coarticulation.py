@@ -17,6 +17,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache, cached_property
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -58,6 +59,7 @@ class SpeechTrack:
     speech: Speech
     effort: float = 1.0
     replaces: str | frozenset[str] | None = None
+    optional: ClassVar[bool] = True             # a face without a tongue speaks as well
 
     def __post_init__(self) -> None:
         if isinstance(self.effort, bool) or not isinstance(self.effort, (int, float)) or not 0.0 <= self.effort <= 2.0:

@@ -20,6 +20,8 @@ from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
 
+import numpy as np
+
 from facegen.animation import espeak_library
 from facegen.animation.phonemes import Sound as Phone
 from facegen.animation.phonemes import read_sounds
@@ -35,6 +37,8 @@ MOST_TEXT = 20_000
 """Characters of one text: about twenty minutes."""
 
 _BREATH = 0.05                  # seconds; a pause that is shorter is none to the mouth
+_CLOSURE = 0.09                 # seconds; the longest that a mouth is closed before a burst
+_QUIET = 0.01                   # of the loudest sample: what is silent
 _LONGEST_RUN = 600.0            # seconds that espeak-ng may take
 _PATIENCE = 20.0                # seconds for a short answer
 _HOW = ("espeak-ng, which reads text, is not installed: apt-get install espeak-ng (Debian, Ubuntu), brew install "
@@ -152,7 +156,8 @@ def _by_library(text: str, voice: str, speed: float, wav: Path) -> tuple[list[Ti
         done = _run([sys.executable, "-I", espeak_library.__file__], json.dumps(request), _LONGEST_RUN)
         if done.returncode == 0:
             answer = json.loads(done.stdout)
-            return _timed(answer["events"], answer["rate"], answer["samples"])
+            made, said = _timed(answer["events"], answer["rate"], answer["samples"])
+            return closed_before(made, read_wav(wav)), said
     return None
 
 
@@ -185,6 +190,30 @@ def _timed(events: Sequence[tuple[int, str]], rate: int, samples: int) -> tuple[
         made += spread(phones, start, end)
     said = (f"espeak-ng says {', '.join(odd)}, which the table of sounds does not have: left out",) if odd else ()
     return made, said
+
+
+def closed_before(sounds: Sequence[TimedSound], sound: Sound) -> list[TimedSound]:
+    """Return sounds whose stops begin where the mouth closes: espeak-ng marks their burst.
+
+    What is silent before a burst, at the end of the sound before it, is the stop's.
+    """
+    loud = np.abs(sound.samples.astype(np.float64))
+    quiet, made = _QUIET * float(loud.max(initial=1.0)), []
+    for one in sounds:
+        if one.phoneme.kind in ("stop", "affricate") and "sil" not in one.phoneme.visemes[0]:
+            last = round(one.start * sound.rate)
+            first = max(0, last - round(_CLOSURE * sound.rate))
+            heard = np.flatnonzero(loud[first:last] > quiet)
+            start = max(first + (int(heard[-1]) + 1 if len(heard) else 0), 0) / sound.rate
+            before = made[-1] if made else None
+            if before is not None:
+                start = max(start, before.start + 0.4 * (before.end - before.start))
+            if start < one.start:
+                if before is not None:
+                    made[-1] = replace(before, end=min(before.end, start))
+                one = replace(one, start=start)
+        made.append(one)
+    return made
 
 
 def _by_program(text: str, voice: str, speed: float, wav: Path, program: str

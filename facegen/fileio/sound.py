@@ -68,7 +68,7 @@ def read_wav(path: str | os.PathLike[str]) -> Sound:
         raise FileError(f"{path}: there is no such file") from error
     except FileError:
         raise
-    except (wave.Error, EOFError, OSError, ValueError) as error:
+    except (wave.Error, EOFError, OSError, ValueError, RuntimeError) as error:    # the last from a chunk too short
         why = "it is a folder" if path.is_dir() else str(error) or "it ends too early"
         raise FileError(f"{path}: cannot be read as a WAV file ({why}); save the sound as a 16-bit WAV file") from error
     samples = np.frombuffer(raw[: len(raw) // (2 * channels) * 2 * channels], "<i2").reshape(-1, channels)

@@ -86,7 +86,7 @@ def half_of(mesh: Mesh) -> Half:
 
     places = _matrix(rows, len(x)) @ mesh.vertices
     on_plane = np.abs(places[:, 0]) < 10 * _ON_PLANE
-    curves = {name: _curves(np.array(faces).reshape(-1, 3)[parts == number], on_plane)
+    curves = {name: _curves(np.array(faces, np.int64).reshape(-1, 3)[parts == number], on_plane)
               for number, name in enumerate(mesh.parts)}
     fills: list[tuple[list[int], int, int, float]] = []       # curve, material, part, how far before the plane
     for number, name in enumerate(mesh.parts):
@@ -116,10 +116,10 @@ def half_of(mesh: Mesh) -> Half:
 
 
 def _matrix(rows: Sequence[dict[int, float]], count: int) -> sparse.csr_array:
-    at = np.concatenate([np.full(len(row), k) for k, row in enumerate(rows)])
-    columns = np.concatenate([list(row) for row in rows])
-    values = np.concatenate([list(row.values()) for row in rows])
-    return sparse.csr_array((values, (at, columns.astype(np.int64))), shape=(len(rows), count))
+    at = [k for k, row in enumerate(rows) for _ in row]
+    columns = [column for row in rows for column in row]
+    values = np.array([value for row in rows for value in row.values()])
+    return sparse.csr_array((values, (np.array(at, np.int64), np.array(columns, np.int64))), shape=(len(rows), count))
 
 
 def _curves(faces: NDArray[np.int64], on_plane: NDArray[np.bool_]) -> list[tuple[list[int], bool]]:

@@ -67,7 +67,7 @@ def test_shares_are_a_mean_and_what_must_be_is_there(drawn):
     times = np.linspace(0, speech.duration, 40)
     for channel in CHANNELS:
         for t in times:
-            rows, shares = one._scores.near(CHANNELS.index(channel), t)
+            _, shares = one._scores.near(CHANNELS.index(channel), t)
             assert (shares >= 0).all()
             assert math.isclose(shares.sum(), 1.0, abs_tol=1e-9)
     for k, sound in enumerate(speech.sounds):
@@ -157,7 +157,7 @@ def test_rounding_is_felt_before_the_vowel():
     assert round_[0, names.index("viseme_U")] > 3 * wide[0, names.index("viseme_I")] > 0
     # the tongue does not wait: the t closes at its middle in both
     one = track("S T UW1")
-    rows, shares = one._scores.near(2, middle(one.speech.sounds[1]))
+    _, shares = one._scores.near(2, middle(one.speech.sounds[1]))
     assert shares.max() == pytest.approx(1.0, abs=1e-6)
 
 
