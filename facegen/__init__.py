@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from facegen.animation.clip import Clip
     from facegen.animation.performance import Performance
     from facegen.animation.script import load_clip, morph
+    from facegen.animation.speech_script import say, speech_clip
     from facegen.blendshapes.recipes import Recipe, shape_set
     from facegen.errors import FacegenError, FileError, InputError, JobError, NotationError, TableError
     from facegen.face.avatar import AvatarFace
@@ -89,7 +90,9 @@ __all__ = [
     "save_passes",
     "save_turn",
     "save_video",
+    "say",
     "shape_set",
+    "speech_clip",
 ]
 
 # Where each name lives. Read on first use (PEP 562), so that `import facegen` costs nothing.
@@ -97,6 +100,7 @@ _HOMES = {
     "facegen.animation.clip": ("Clip",),
     "facegen.animation.performance": ("Performance",),
     "facegen.animation.script": ("load_clip", "morph"),
+    "facegen.animation.speech_script": ("say", "speech_clip"),
     "facegen.blendshapes.recipes": ("Recipe", "shape_set"),
     "facegen.errors": ("FacegenError", "FileError", "InputError", "JobError", "NotationError", "TableError"),
     "facegen.face.avatar": ("AvatarFace",),

@@ -75,27 +75,25 @@ def lesson(sounds: str | None = None, *, text: str | None = None, language: str 
            slow: float = 4.0) -> Lesson:
     """Return a lesson of sounds, or of a text that espeak-ng reads, ``slow`` times slower.
 
-    Vowels and consonants alone are shown one by one, a consonant between two short vowels; anything longer as it is
-    said. Raises NotationError, InputError.
+    Sounds between commas are said together. One alone is shown by itself, a consonant between two short vowels; so are
+    consonants without any vowel. Raises NotationError, InputError.
     """
     if (sounds is None) == (text is None):
         raise InputError("expected sounds or text, one of the two")
     if text is not None:
         speech = say(text=text, language=language).speech
         return Lesson(speech.slower(slow), _said(speech), slow)
-    found = [one for one in read_sounds(sounds, alphabet) if one.label != PAUSE]
-    if len({one.phoneme.is_vowel for one in found}) == 2:
-        speech = speech_of(found)
-        return Lesson(speech.slower(slow), _said(speech), slow)
     table = load_speech_table()
     between, pause = Sound(table.phonemes[_BETWEEN], _BETWEEN), Sound(table.pause, PAUSE)
     row: list[Sound] = []
     shown: list[int] = []
-    for one in found:
-        row += [pause] if row else []
-        row += [] if one.phoneme.is_vowel else [between]
-        shown.append(len(row))
-        row += [one] if one.phoneme.is_vowel else [one, between]
+    for group in _groups(read_sounds(sounds, alphabet)):
+        alone = len({one.phoneme.is_vowel for one in group}) == 1
+        for together in ([one] for one in group) if alone else [group]:
+            framed = alone and not group[0].phoneme.is_vowel
+            row += ([pause] if row else []) + ([between] if framed else [])
+            shown += range(len(row), len(row) + len(together))
+            row += together + ([between] if framed else [])
     return Lesson(speech_of(row).slower(slow), tuple(shown), slow)
 
 
@@ -167,6 +165,17 @@ def _mouth(rig: Rig, vertices: NDArray[np.float64], detail: int) -> NDArray[np.f
     middle, width = (left + right) / 2, float(np.linalg.norm(left - right))
     return np.array([middle + width * np.array([x, y, z])
                      for x in (-_SIDE, _SIDE) for y in (-_BELOW, _ABOVE) for z in (-_BEHIND, _BEFORE)])
+
+
+def _groups(sounds: list[Sound]) -> list[list[Sound]]:
+    """Return what stands between pauses."""
+    made: list[list[Sound]] = [[]]
+    for one in sounds:
+        if one.label == PAUSE:
+            made.append([])
+        else:
+            made[-1].append(one)
+    return [group for group in made if group]
 
 
 def _said(speech: Speech) -> tuple[int, ...]:

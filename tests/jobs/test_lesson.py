@@ -21,6 +21,8 @@ def test_a_consonant_stands_between_vowels():
     assert labels(made) == ["TH", "S"]
     assert [one.label for one in made.speech.sounds] == ["ə", "TH", "ə", "sil", "ə", "S", "ə"]
     assert [one.label for one in lesson("i u").speech.sounds] == ["i", "sil", "u"]
+    assert [one.label for one in lesson("θ, ɹi, u").speech.sounds] == ["ə", "θ", "ə", "sil", "ɹ", "i", "sil", "u"]
+    assert labels(lesson("θ, ɹi, u")) == ["θ", "ɹ", "i", "u"]
     assert labels(lesson("θɹi")) == ["θ", "ɹ", "i"]                     # a word is said as it is
 
 
