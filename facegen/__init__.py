@@ -19,8 +19,10 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from facegen.animation.clip import Clip
     from facegen.animation.performance import Performance
+    from facegen.animation.playback import Playback
     from facegen.animation.script import load_clip, morph
     from facegen.animation.speech_script import say, speech_clip
+    from facegen.animation.streams.files import load_performance, save_performance
     from facegen.blendshapes.recipes import Recipe, shape_set
     from facegen.errors import FacegenError, FileError, InputError, JobError, NotationError, TableError
     from facegen.face.avatar import AvatarFace
@@ -35,10 +37,12 @@ if TYPE_CHECKING:
     from facegen.fileio.images import contact_sheet, save_image
     from facegen.fileio.video import save_video
     from facegen.geometry.mesh import Mesh
+    from facegen.jobs.adopting import adopt
     from facegen.jobs.batch import run_batch
     from facegen.jobs.frames import save_clip, save_turn
     from facegen.jobs.rigging import rig
     from facegen.render import Renderer, Wireframe, render, render_passes, save_passes
+    from facegen.render.live import Live
     from facegen.transfer.rig import avatar_names
 
 __version__ = "0.1.0"
@@ -55,14 +59,17 @@ __all__ = [
     "FileError",
     "InputError",
     "JobError",
+    "Live",
     "Mesh",
     "NotationError",
     "Performance",
+    "Playback",
     "Recipe",
     "Renderer",
     "Resolution",
     "TableError",
     "Wireframe",
+    "adopt",
     "avatar_names",
     "canonical",
     "contact_sheet",
@@ -73,6 +80,7 @@ __all__ = [
     "load_deformation",
     "load_expressions",
     "load_face",
+    "load_performance",
     "load_person",
     "load_units",
     "morph",
@@ -88,6 +96,7 @@ __all__ = [
     "save_clip",
     "save_image",
     "save_passes",
+    "save_performance",
     "save_turn",
     "save_video",
     "say",
@@ -99,8 +108,10 @@ __all__ = [
 _HOMES = {
     "facegen.animation.clip": ("Clip",),
     "facegen.animation.performance": ("Performance",),
+    "facegen.animation.playback": ("Playback",),
     "facegen.animation.script": ("load_clip", "morph"),
     "facegen.animation.speech_script": ("say", "speech_clip"),
+    "facegen.animation.streams.files": ("load_performance", "save_performance"),
     "facegen.blendshapes.recipes": ("Recipe", "shape_set"),
     "facegen.errors": ("FacegenError", "FileError", "InputError", "JobError", "NotationError", "TableError"),
     "facegen.face.avatar": ("AvatarFace",),
@@ -115,9 +126,11 @@ _HOMES = {
     "facegen.fileio.images": ("contact_sheet", "save_image"),
     "facegen.fileio.video": ("save_video",),
     "facegen.geometry.mesh": ("Mesh",),
+    "facegen.jobs.adopting": ("adopt",),
     "facegen.jobs.batch": ("run_batch",),
     "facegen.jobs.frames": ("save_clip", "save_turn"),
     "facegen.jobs.rigging": ("rig",),
+    "facegen.render.live": ("Live",),
     "facegen.render.overlay": ("Wireframe",),
     "facegen.render.passes": ("render_passes",),
     "facegen.render.passfiles": ("save_passes",),

@@ -37,12 +37,14 @@ _CORE = (0.35, 0.35)            # of a sound's length, from its ends: between th
 _MUST = (0.15, 0.25)            # the same for what must be; the burst of a p comes before its end
 _MARGIN = 0.05                  # s; the most that a core keeps from the ends: what is long is held
 _SHORTEST_MUST = 0.042          # s; so that one frame in 25 a second shows the lips closed
+_CHANGE = 0.020                 # s; between two that both must be, at least
 _ROUND = 0.010                  # s; how the tip of a dominance is rounded
 _SILENT_EDGE = 1.0              # s of rest before the first and after the last sound
 _STRESSED = {"none": 0.85, "secondary": 0.95, "primary": 1.0, None: 1.0}     # share of the opening
 _TONGUE_TIMES = (0.045, 0.045)  # s, lead and lag
 _CLOSING, _OPENING = 0.08, 0.09     # s; how long before and after its core what must be comes and goes
 _TINY = 1e-4                    # a share that nobody sees
+_EPSILON = 1e-15                # keeps the odds of what is certain finite
 
 Array = NDArray[np.float64]
 
@@ -172,6 +174,16 @@ class _Scores:
         self.lag = np.array([lag, lag, [_TONGUE_TIMES[1]] * len(rows)])
         self.reach = 40.0 * max(float(self.lead.max()), float(self.lag.max()))
 
+        low, high = self._core(_MUST, _SHORTEST_MUST)
+        self.low, self.high = np.tile(low, (len(CHANNELS), 1)), np.tile(high, (len(CHANNELS), 1))
+        for low, high, must in zip(self.low, self.high, self.must, strict=True):
+            of = np.flatnonzero(must)
+            one, other = of[:-1], of[1:]                # each in its own time, and a moment to change between them
+            border = (self.end[one] + self.start[other]) / 2
+            middle = (low + high) / 2
+            high[one] = np.minimum(high[one], np.maximum(middle[one], border - _CHANGE / 2))
+            low[other] = np.maximum(low[other], np.minimum(middle[other], border + _CHANGE / 2))
+
         # Equal poses are one: few, whatever the length of the speech.
         kinds = [[(row[2], row[4]) for row in rows], [(row[2], row[4]) for row in rows], [row[3] for row in rows]]
         self.poses: list[list[Pose]] = []
@@ -187,8 +199,9 @@ class _Scores:
         last = int(np.searchsorted(self.start, t + self.reach))
         rows = np.arange(min(first, len(self.start) - 1), max(last, first + 1))
         rows = rows[rows < len(self.start)]
-        before, after = self._away(rows, np.array([t]), _CORE, 0.0)
-        away = _rounded(before[0]) / self.lead[channel, rows] + _rounded(after[0]) / self.lag[channel, rows]
+        low, high = self._core(_CORE, 0.0, rows)
+        before, after = np.maximum(0.0, low - t), np.maximum(0.0, t - high)
+        away = _rounded(before) / self.lead[channel, rows] + _rounded(after) / self.lag[channel, rows]
         alpha = self.alpha[channel, rows]
         if not alpha.any():
             return rows, np.full(len(rows), 1.0 / len(rows))
@@ -197,24 +210,25 @@ class _Scores:
         soft = np.exp(logs - logs.max())
         must = self.musts(channel, np.array([t]), rows)[0]
         # By odds, so that in the middle of one the ramps of its neighbours count nothing.
-        certain, odds = 1.0 - float(np.prod(1.0 - must)), must / (1.0 - must + _TINY * _TINY)
+        certain, odds = 1.0 - float(np.prod(1.0 - must)), np.sqrt(must / (np.maximum(1.0 - must, 0.0) + _EPSILON))
         shares = (1.0 - certain) * soft / soft.sum()
         return rows, shares + certain * odds / odds.sum() if certain else shares
 
     def musts(self, channel: int, times: Array, rows: NDArray[np.intp]) -> Array:
         """Return how far (n, k) what must be is there: 1 in the middle of its sound."""
-        before, after = self._away(rows, times, _MUST, _SHORTEST_MUST)
+        before = np.maximum(0.0, self.low[channel, rows] - times[:, None])
+        after = np.maximum(0.0, times[:, None] - self.high[channel, rows])
         left = np.maximum(0.0, 1.0 - before / _CLOSING - after / _OPENING)
         return np.where(self.must[channel, rows], min_jerk(left), 0.0)
 
-    def _away(self, rows: NDArray[np.intp], times: Array, core: tuple[float, float], least: float
+    def _core(self, share: tuple[float, float], least: float, rows: NDArray[np.intp] | slice = slice(None)
               ) -> tuple[Array, Array]:
-        """Return how long (n, k) before and after the core of sounds times are, seconds."""
+        """Return where the cores of sounds begin and end (k,), seconds."""
         start, length = self.start[rows], self.end[rows] - self.start[rows]
-        low = start + np.minimum(core[0] * length, _MARGIN)
-        high = start + length - np.minimum(core[1] * length, _MARGIN)
+        low = start + np.minimum(share[0] * length, _MARGIN)
+        high = start + length - np.minimum(share[1] * length, _MARGIN)
         middle, half = (low + high) / 2, np.maximum(high - low, least) / 2
-        return (np.maximum(0.0, middle - half - times[:, None]), np.maximum(0.0, times[:, None] - middle - half))
+        return middle - half, middle + half
 
 
 def _rounded(tau: Array) -> Array:

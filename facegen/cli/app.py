@@ -11,7 +11,20 @@ from typing import Annotated
 import typer
 
 from facegen import __version__
-from facegen.cli import batch, explain, figures, film, gallery, listing, phoneme, picture, speak
+from facegen.cli import adopt as adopting
+from facegen.cli import (
+    batch,
+    convert,
+    explain,
+    figures,
+    film,
+    gallery,
+    listing,
+    phoneme,
+    picture,
+    play,
+    speak,
+)
 from facegen.cli import rig as rigging
 from facegen.errors import FacegenError, InputError
 
@@ -32,9 +45,12 @@ app.command("figures")(figures.figures)
 app.command("animate")(film.animate)
 app.command("morph")(film.morph)
 app.command("turntable")(film.turntable)
+app.command("play")(play.play)
 app.command("rig")(rigging.rig)
 app.command("speak")(speak.speak)
 app.command("phoneme")(phoneme.phoneme)
+app.command("convert")(convert.convert)
+app.command("adopt")(adopting.adopt)
 
 
 def _version(asked: bool) -> None:

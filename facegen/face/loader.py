@@ -27,10 +27,15 @@ REQUIRED = ("name", "source", "cage", "centre_O", "measures", "scales", "points"
             "lids", "head")
 _PULL_DOWN = 0.6        # how far down a point's pull on a part reaches, as a share of its reach
 OPTIONAL = ("sheets", "followers", "creases", "corners", "parts", "folds", "lid_follow", "head_half_height",
-            "landmarks")
+            "landmarks", "surface", "eye_size", "colours")
 CARRIERS = ("skull", "skin", "jaw", "eye", "mouth")
 ROLES = ("input", "jaw", "fixed")
 SIDES = ("L", "R")
+FINEST = 3
+"""The subdivision level whose surface all levels sample, and that a file ``surface`` describes."""
+EYE_SIZES = (0.2, 5.0)
+"""Least and largest size of the eyeballs, times the base face's."""
+_BRIGHTEST = 255.0
 _FARTHEST = 1e6     # mm: no face is larger
 
 
@@ -54,6 +59,7 @@ class FaceData:
     scales: Mapping[str, Array]
     regions: tuple[Region, ...]
     eye_centres: Array
+    eye_size: float             # of the eyeballs, times the base face's
     lid_rims: tuple[NDArray[np.int32], ...]
     lid_skin: tuple[NDArray[np.int32], ...]
     lid_follow: Array           # (down or up, upper or lower lid): travel per degree of gaze
@@ -64,6 +70,8 @@ class FaceData:
     folds: Mapping[str, Fold]
     takes_input: NDArray[np.bool_]
     landmarks: Mapping[str, Landmark]
+    colours: Mapping[str, tuple[float, float, float]] | None     # material -> sRGB 0..255, where not the usual ones
+    relief: Array | None        # (n, 3) what the surface has beyond the smooth cage, at the finest level
 
 
 def read_face(path: Path) -> FaceData:
@@ -182,6 +190,7 @@ def read_face(path: Path) -> FaceData:
             if frozenset(edge) not in sides:
                 raise entry.wrong("two vertices that share an edge of the cage")
     corners = indices(top["corners"]) if "corners" in top else np.empty(0, np.int32)
+    relief = _relief(top["surface"], path.parent, cage, creases, corners) if "surface" in top else None
     load = cache(load_obj)      # several parts lie in one file
 
     @cache
@@ -217,11 +226,13 @@ def read_face(path: Path) -> FaceData:
         top["name"].text(), top["source"].text(), deformer, cage.faces, cage.materials, cage.face_materials,
         creases, corners, tuple(names), {**aliases, **at}, np.array(point_vertices),
         tuple(part_of.get(row) for row in range(len(names))), np.array(point_scale), scales, tuple(regions),
-        np.array(list(eyes.values())), tuple(rims), tuple(lid_skin), follow,
+        np.array(list(eyes.values())), top["eye_size"].number(*EYE_SIZES) if "eye_size" in top else 1.0,
+        tuple(rims), tuple(lid_skin), follow,
         place(head["pivot"]), head_weight,
         top["head_half_height"].number(1e-6) if "head_half_height" in top
         else float(np.ptp(cage.vertices[:, 1]) / 2),
-        attachments, folds, np.array(takes_input), landmarks)
+        attachments, folds, np.array(takes_input), landmarks,
+        {name: _colour(e) for name, e in top["colours"].items()} if "colours" in top else None, relief)
 
 
 def _integer(key: str) -> object:
@@ -235,6 +246,23 @@ def _some(entry: Entry, count: int | None, expected: str) -> list[Entry]:
         raise entry.wrong(expected)
     return items
 
+
+def _colour(entry: Entry) -> tuple[float, float, float]:
+    found = entry.vector(_BRIGHTEST)
+    if min(found) < 0:
+        raise entry.wrong("three numbers from 0 to 255: red, green and blue in sRGB")
+    return found
+
+
+def _relief(entry: Entry, folder: Path, cage: Mesh, creases: NDArray, corners: NDArray) -> Array:
+    """Return how far each vertex of a file's surface lies from the smooth cage's, (n, 3)."""
+    surface = load_obj(folder / entry.text())
+    smooth = loop_levels(len(cage.vertices), cage.faces, creases, FINEST, corners=corners)[-1]
+    if surface.vertices.shape[0] != smooth.matrix.shape[0] or not np.array_equal(surface.faces, smooth.faces):
+        raise entry.fail(f"{entry.text()} is no surface of this cage: expected the {smooth.matrix.shape[0]} vertices "
+                         f"and {len(smooth.faces)} triangles of its subdivision level {FINEST} in their order, got "
+                         f"{len(surface.vertices)} and {len(surface.faces)}")
+    return surface.vertices - smooth.matrix @ cage.vertices
 
 
 def _pull(vertices: Array, at: Array, reach: float | None) -> Array:

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import csr_array
 
 # Because a smaller change of a unit normal changes no 8-bit pixel.
 _UNSEEN = 1e-3
@@ -22,87 +21,94 @@ _TINY = 1e-30                                       # a length below which there
 class TurningNormals:
     """The normals of one surface. points, normals: (n, 3). faces: (m, 3), counter-clockwise seen from outside."""
 
+    # Inside, vectors stand in columns (3, n): NumPy is slow along short last axes.
+
     def __init__(self, points: NDArray, normals: NDArray, faces: NDArray[np.int64]) -> None:
-        self._points = np.asarray(points, dtype=np.float64)
-        self._normals = np.asarray(normals, dtype=np.float64)
+        self._points, self._normals = (np.array(one, np.float64).T.copy() for one in (points, normals))
         self._group = _smooth_groups(self._points, self._normals)
-        self._faces = faces
-        corners = self._group[faces]                                    # (m, 3) smooth vertices
+        self._faces = np.ascontiguousarray(np.asarray(faces, np.intp).T)        # (3, m)
+        self._corners = self._group[self._faces]                        # (3, m) smooth vertices
         self._count = int(self._group.max(initial=-1)) + 1
-        self._neutral = _unit_normals(self._points[faces])
-        triangle = np.repeat(np.arange(len(faces)), 3)
-        self._spread = csr_array((_angles(self._points[faces]).ravel(), (corners.ravel(), triangle)),
-                                 shape=(self._count, len(faces)))
-        self._sum = self._spread @ self._neutral
+        places = self._points[:, self._faces]
+        self._angles = _angles(places)
+        self._neutral = _face_normals(places)
+        self._sum = self._added(np.arange(len(faces)), self._neutral)
+        self._before = _unit(self._sum)
 
     def change(self, rows: NDArray[np.int64], motion: NDArray) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
         """Return which normals change, ascending, and by how much (k, 3), if ``rows`` move by ``motion`` (r, 3)."""
-        moved = np.zeros(len(self._points), dtype=bool)
+        moved = np.zeros(self._points.shape[1], dtype=bool)
         moved[rows] = True
-        a, b, c = self._faces.T
+        a, b, c = self._faces
         touched = np.flatnonzero(moved[a] | moved[b] | moved[c])
         points = self._points.copy()
-        points[rows] += motion
-        turn = np.zeros_like(self._neutral)
-        turn[touched] = _unit_normals(points[self._faces[touched]]) - self._neutral[touched]
-        total = self._sum + self._spread @ turn
+        points[:, rows] += motion.T
+        places = np.take(points, np.take(self._faces, touched, axis=1), axis=1)
+        turn = _face_normals(places) - np.take(self._neutral, touched, axis=1)
+        total = self._sum + self._added(touched, turn)
         surface = np.zeros(self._count, dtype=bool)
-        surface[self._group[self._faces[touched].ravel()]] = True
+        surface[np.take(self._corners, touched, axis=1)] = True
         which = np.flatnonzero(surface[self._group])
-        before, after = _unit(self._sum[self._group[which]]), _unit(total[self._group[which]])
-        change = _turned(self._normals[which], before, after) - self._normals[which]
+        groups = self._group[which]
+        normals = np.take(self._normals, which, axis=1)
+        before, after = (np.take(one, groups, axis=1) for one in (self._before, total))
+        change = _turned(normals, before, _unit(after)) - normals
         seen = _dot(change, change) > _UNSEEN ** 2
-        return which[seen], change[seen]
+        return which[seen], change[:, seen].T
+
+    def _added(self, triangles: NDArray[np.int64], vectors: NDArray) -> NDArray[np.float64]:
+        """Return the sums (3, smooth vertices) of vectors (3, k) of triangles (k,), by the angles at their corners."""
+        corners, angles = (np.take(one, triangles, axis=1) for one in (self._corners, self._angles))
+        corners = corners.ravel()
+        return np.stack([np.bincount(corners, (angles * axis).ravel(), self._count) for axis in vectors])
 
 
 def _smooth_groups(points: NDArray, normals: NDArray) -> NDArray[np.int64]:
     """Return for each vertex the number of its smooth vertex: same place and, where there is a crease, same normal."""
-    place = np.unique(points, axis=0, return_inverse=True)[1].ravel()
-    mean = _unit(np.stack([np.bincount(place, column) for column in _unit(normals).T], axis=1))
-    crease = _dot(_unit(normals), mean[place]) < _SMOOTH
-    creased = np.zeros(len(mean), dtype=bool)
+    place = np.unique(points.T, axis=0, return_inverse=True)[1].ravel()
+    unit = _unit(normals)
+    mean = _unit(np.stack([np.bincount(place, axis) for axis in unit]))
+    crease = _dot(unit, mean[:, place]) < _SMOOTH
+    creased = np.zeros(mean.shape[1], dtype=bool)
     creased[place[crease]] = True
-    side = np.where(creased[place, None], np.round(normals, 2), 0.0) + 0.0
-    return np.unique(np.column_stack([place, side]), axis=0, return_inverse=True)[1].ravel()
+    side = np.where(creased[place], np.round(normals, 2), 0.0) + 0.0
+    return np.unique(np.column_stack([place, *side]), axis=0, return_inverse=True)[1].ravel()
 
 
-def _unit_normals(corners: NDArray) -> NDArray[np.float64]:
-    """Return unit normals (m, 3) of triangles (m, 3 corners, 3); zero for one without area."""
+def _face_normals(corners: NDArray) -> NDArray[np.float64]:
+    """Return unit normals (3, m) of triangles (3, 3 corners, m); zero for one without area."""
     return _unit(_cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]))
 
 
 def _cross(a: NDArray, b: NDArray) -> NDArray[np.float64]:
-    """Return the cross products of rows (m, 3): by hand, since np.cross takes three times as long."""
-    result = np.empty_like(a)
-    for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
-        result[:, i] = a[:, j] * b[:, k] - a[:, k] * b[:, j]
-    return result
+    """Return the cross products of columns (3, m)."""
+    return np.stack([a[j] * b[k] - a[k] * b[j] for j, k in ((1, 2), (2, 0), (0, 1))])
 
 
 def _dot(a: NDArray, b: NDArray) -> NDArray[np.float64]:
-    return np.einsum("...i,...i->...", a, b)
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
 def _angles(corners: NDArray) -> NDArray[np.float64]:
-    """Return the angle at each corner (m, 3), radians."""
+    """Return the angle at each corner (3, m) of triangles (3, 3 corners, m), radians."""
     after = _unit(np.roll(corners, -1, axis=1) - corners)
     before = _unit(np.roll(corners, 1, axis=1) - corners)
     return np.arccos(np.clip(_dot(after, before), -1.0, 1.0))
 
 
 def _unit(vectors: NDArray) -> NDArray[np.float64]:
-    """Return vectors of length 1; one that is too short to have a direction becomes zero."""
+    """Return vectors (3, ...) of length 1; one that is too short to have a direction becomes zero."""
     length = np.sqrt(_dot(vectors, vectors))
-    return vectors * np.where(length > _TINY, 1.0 / np.maximum(length, _TINY), 0.0)[..., None]
+    return vectors * np.where(length > _TINY, 1.0 / np.maximum(length, _TINY), 0.0)
 
 
 def _turned(vectors: NDArray, before: NDArray, after: NDArray) -> NDArray[np.float64]:
-    """Return vectors turned by the least rotation from ``before`` to ``after`` (Rodrigues); all (k, 3)."""
+    """Return vectors turned by the least rotation from ``before`` to ``after`` (Rodrigues); all (3, k)."""
     axis, cosine = _cross(before, after), _dot(before, after)
     opposite = 1.0 + cosine < _OPPOSITE
     along = _dot(axis, vectors) / np.where(opposite, 1.0, 1.0 + cosine)
-    turned = vectors * cosine[:, None] + _cross(axis, vectors) + axis * along[:, None]
-    turned[opposite] = -vectors[opposite]           # right over: every axis across is as good
+    turned = vectors * cosine + _cross(axis, vectors) + axis * along
+    turned[:, opposite] = -vectors[:, opposite]     # right over: every axis across is as good
     still = (_dot(before, before) == 0) | (_dot(after, after) == 0)
-    turned[still] = vectors[still]                  # the surface has no direction there: leave the file's
+    turned[:, still] = vectors[:, still]            # the surface has no direction there: leave the file's
     return turned

@@ -8,8 +8,8 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from facegen.data import meshes_dir, tables_dir
-from facegen.face.face import AVATARS, load_face
+from facegen.data import tables_dir
+from facegen.face.face import AVATARS, face_file, load_face
 from facegen.facs.yamlfile import read_data
 
 TABLES = ("action_units.yaml", "deformations.yaml", "expressions.yaml", "lights.yaml", "vocabularies.yaml")
@@ -43,12 +43,10 @@ kept_digest = cache(_read)
 
 def face_files(face: str) -> list[Path]:
     """Return the files of a parametric face, by name or path: its ``face.yaml`` and all that it names."""
-    path = meshes_dir() / face / "face.yaml"
-    if not path.is_file():
-        path = Path(face)
-        path = path / "face.yaml" if path.is_dir() else path
+    path = face_file(face)
     data = read_data(path)
-    named = {data["cage"], data.get("landmarks", "landmarks.yaml"), *(part["file"] for part in data.get("parts", ()))}
+    named = {data["cage"], data.get("landmarks", "landmarks.yaml"), *(part["file"] for part in data.get("parts", ())),
+             *filter(None, [data.get("surface")])}
     files = [path, *(path.parent / name for name in sorted(named))]
     return [one for one in files if one.is_file()]
 

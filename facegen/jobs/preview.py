@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +11,8 @@ from numpy.typing import NDArray
 
 from facegen.errors import InputError
 from facegen.face.avatar import AvatarFace
+from facegen.face.face import Face
+from facegen.face.rig import Rig
 from facegen.fileio.images import check_image_path, contact_sheet, save_image
 from facegen.render.render import Renderer
 
@@ -33,8 +35,18 @@ def save_preview(face: AvatarFace, path: str | os.PathLike[str], *, size: int = 
 
         save_preview(facegen.load_face("cat.glb"), "cat.png")
     """
+    return save_poses(face, telling_poses(face), path, size=size)
+
+
+def save_face_preview(face: Face, path: str | os.PathLike[str], *, size: int = 192) -> Path:
+    """Draw a parametric face, its neutral and expressions, each from two views; return the path. As `save_preview`."""
+    return save_poses(face, {"neutral": face.pose(), **{label: face.pose(what) for label, what in EXPRESSIONS.items()}},
+                      path, size=size)
+
+
+def save_poses(face: Rig, poses: Mapping[str, NDArray], path: str | os.PathLike[str], *, size: int = 192) -> Path:
+    """Draw poses, label -> vertices (n, 3), each from two views, as one sheet; return the path."""
     path = check_image_path(path)
-    poses = telling_poses(face)
     around = np.concatenate(list(poses.values()))
     drawn = [[renderer.draw(vertices) for vertices in poses.values()]
              for renderer in (Renderer(face, size=size, view=view, around=around) for view in VIEWS)]

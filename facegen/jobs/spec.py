@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from facegen.errors import FacegenError, InputError, TableError
-from facegen.face.face import face_names, load_face
+from facegen.face.face import face_names, is_face_name, load_face
 from facegen.facs.expression_table import is_path
 from facegen.facs.expressions import Resolution, full_name, resolve
 from facegen.facs.units import load_catalogue
@@ -234,7 +234,7 @@ class _Reader:
             return None if nobody else self._at_home(entry.text())
         if key == "face":
             name = entry.text()
-            face = name if name in face_names() else str((self.folder / name).resolve())
+            face = name if is_face_name(name) else str((self.folder / name).resolve())
             if face != name and not Path(face).exists():
                 entry.choice(face_names(), "face")
             rig = self._checked(entry, lambda: load_face(face))

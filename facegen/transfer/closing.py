@@ -14,9 +14,10 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from facegen.geometry.fade import smooth_step
+from facegen.geometry.normals import vertex_normals
 from facegen.transfer.closing_field import Field, closing_field
 from facegen.transfer.eyeball import EyeFront
 from facegen.transfer.margins import LIPS, SAMPLES, Margins, Slit, facing_margins
@@ -32,6 +33,8 @@ _LEAST_CHANGE = 0.1
 _PARTED = 1.0
 # Millimetres: a miss of this size counts half; on a faithful copy there is none to mend.
 _TOLERATED = 0.05
+# Where a slit stays open, this share of what is left counts as little, up to so many millimetres.
+_OF_OPEN, _TOLERATED_OPEN = 0.2, 0.6
 # Millimetres by which a rim may move otherwise than its edge: a lid rolls as it closes.
 _ROLLS = 0.5
 # A slit counts as shut where the template leaves no more than this share of it, and this many mm.
@@ -42,6 +45,8 @@ _ON_THE_BALL = 1.25
 _LIFTED, _OUT = 0.15, 0.02
 # The middle of a triangle with sides s lies nearer to the eye than its corners: sqrt(1 - s^2 / 3), at most so much.
 _MOST_SAG = 0.3
+# Sides up to the first of these, in radii, are as long as their mean; from the second on the longest decides.
+_FINE, _COARSE = 0.7, 0.9
 # What counts less than this is rounding: most shapes leave a slit as it is.
 _NOTHING = 1e-9
 _TINY = 1e-300
@@ -68,6 +73,7 @@ class Closing:
     rest: Array
     eye: EyeFront | None
     wanted: _Wanted
+    faces: NDArray = None
 
     def closes(self) -> NDArray[np.bool_]:
         """Return which shapes (k,) shut the slit."""
@@ -78,7 +84,8 @@ class Closing:
         wanted, gap = self.wanted, self.margins.gap(self.rest)
         for k in np.flatnonzero(wanted.active.max(axis=1) > 0):
             missing = wanted.active[k, :, None] * (wanted.gap[k] - gap - self.margins.gap(motion[k]))
-            counts = _beyond(missing)
+            still_open = np.linalg.norm(wanted.gap[k], axis=1)
+            counts = _beyond(missing, np.minimum(_TOLERATED + _OF_OPEN * still_open, _TOLERATED_OPEN))
             if counts.max() < _NOTHING:
                 continue
             missing = missing * counts[:, None]
@@ -116,6 +123,15 @@ class Closing:
         """The field's vertices (r, 3) in radii of the eye."""
         return self.eye.ball.in_radii(self.rest[self.field.rows])
 
+    @cached_property
+    def _sunk(self) -> Array:
+        """How much nearer to the eye (r,) than clear of it the skin is at rest, in radii: it may stay as near; but
+        within the eye, only a lid's back, where nobody sees it."""
+        unit, home = _unit(self._at_rest), np.linalg.norm(self._at_rest, axis=1)
+        near = np.maximum(self._over(unit) - home, 0.0)
+        back = (vertex_normals(self.rest, self.faces)[self.field.rows] * self._at_rest).sum(axis=1) < 0
+        return np.where(back | (home > self.eye(unit)), near, 0.0)
+
     def _move(self, moved: Array, step: Array) -> None:
         """Move the skin of the field by (r, 3), in place: on an arc round the ball, and over what it covers."""
         rows = self.field.rows
@@ -127,7 +143,7 @@ class Closing:
         then = now + step @ ball.inverse
         home = np.linalg.norm(self._at_rest, axis=1)
         lift = np.clip(np.linalg.norm(then - self._at_rest, axis=1) / _LIFTED, 0.0, 1.0)
-        wanted = np.where(home < _ON_THE_BALL, np.maximum(home, self._over(_unit(then))), 0.0)
+        wanted = np.where(home < _ON_THE_BALL, np.maximum(home, self._over(_unit(then)) - self._sunk), 0.0)
         radius = np.linalg.norm(now, axis=1)
         radius = radius + _beyond(step) * lift * np.maximum(wanted - radius, 0.0)
         changed = (step != 0).any(axis=1) & (then != 0).any(axis=1)
@@ -138,9 +154,13 @@ class Closing:
         """Return the radius (r,) at which triangles with corners in the directions (r, 3) clear the eye."""
         edges = self.field.edges
         side = ((unit[edges[:, 0]] - unit[edges[:, 1]]) ** 2).sum(axis=1)
+        ends, both = edges.ravel(), np.repeat(side, 2)
         longest = np.zeros(len(unit))
-        np.maximum.at(longest, edges.ravel(), np.repeat(side, 2))
-        return (self.eye(unit) + _OUT) / np.sqrt(1 - np.minimum(longest / 3, _MOST_SAG))
+        np.maximum.at(longest, ends, both)
+        mean = np.bincount(ends, both, len(unit)) / np.maximum(np.bincount(ends, minlength=len(unit)), 1)
+        coarse = smooth_step((np.sqrt(longest) - _FINE) / (_COARSE - _FINE))
+        square = mean + coarse * (longest - mean)
+        return (self.eye(unit) + _OUT) / np.sqrt(1 - np.minimum(square / 3, _MOST_SAG))
 
 
 def closing(skin: Skin, slit: Slit, eye: EyeFront | None = None) -> Closing | None:
@@ -156,7 +176,7 @@ def closing(skin: Skin, slit: Slit, eye: EyeFront | None = None) -> Closing | No
     told = _told_lips if slit is LIPS else _told_lids
     upper, lower = (np.stack([edge @ one for one in template.motion]) for edge in (own.upper, own.lower))
     wanted = told(own.gap(template.surface.vertices), upper, lower, margins.gap(rest), skin.parts.matrices[slit.name])
-    return Closing(margins, closing_field(skin, own, margins), rest, eye, wanted)
+    return Closing(margins, closing_field(skin, own, margins), rest, eye, wanted, skin.surface.faces)
 
 
 def _told_lips(gap: Array, upper: Array, lower: Array, own_gap: Array, part: Array) -> _Wanted:
@@ -188,7 +208,7 @@ def _told_lids(gap: Array, upper: Array, lower: Array, own_gap: Array, part: Arr
     return _Wanted(target, active, share, shut)
 
 
-def _beyond(missing: Array, tolerated: float = _TOLERATED) -> Array:
+def _beyond(missing: Array, tolerated: ArrayLike = _TOLERATED) -> Array:
     """Return how much misses (s, 3) count: not at all where a faithful copy misses nothing."""
     square = (missing**2).sum(axis=1)
     return square / (square + tolerated**2)

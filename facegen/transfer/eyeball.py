@@ -32,7 +32,7 @@ _BEHIND = 0.57
 # their own.
 _ASIDE = 30.0
 # What stands out of an eye, a cornea or a glint, counts so many radii around: lids of few vertices span it.
-_AROUND = 0.3
+_AROUND = 0.1
 _TINY = 1e-300
 
 

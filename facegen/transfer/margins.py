@@ -34,6 +34,9 @@ _WRONG_SIDE = 20.0
 _LONGEST = 2.5
 # Millimetres on the template: no way leads farther round the guide than this.
 _BESIDE = 20.0
+# An avatar's own lengths decide by so much which places of its edges face each other, the template's by the rest: where
+# many vertices lie at one corner of the template's, their own order spreads them.
+_OWN = 0.3
 # A guide is sampled at so many places.
 _GUIDE = 200
 
@@ -59,7 +62,8 @@ LIPS = Slit("mouth", ("mouth_corner_R", "mouth_corner_L"), ("mouth_inner_top",),
 class Margins:
     """``upper``, ``lower``: (SAMPLES, n) weights of the vertices that place facing places of the two edges, corner to
     corner; ``rows``: the vertices on one of them, ``at`` their position along the slit, 0 to 1, and ``is_upper``;
-    ``corners``: vertices of both. ``line`` (2, g, 3): the edges as curves, mm."""
+    ``corners``: vertices of both. ``line`` (2, g, 3): the edges as curves, mm; ``paths``: each edge's vertices
+    (p, 3), mm, and their positions (p,) along the slit."""
 
     upper: sparse.csr_array
     lower: sparse.csr_array
@@ -68,6 +72,7 @@ class Margins:
     is_upper: NDArray[np.bool_]
     corners: NDArray[np.int64]
     line: Array
+    paths: tuple[tuple[Array, Array], ...]
 
     def ends(self, places: Array) -> tuple[Array, Array]:
         """Return the facing places (SAMPLES, 3) of the upper and the lower edge, for the skin's vertices (n, 3)."""
@@ -87,17 +92,17 @@ def facing_margins(skin: Skin, slit: Slit) -> tuple[Margins, Margins] | None:
     own = find_margins(template.surface, slit, template.places, skin.correspondence.sides)
     if own is None:
         return None
-    avatar = find_margins(skin.surface, slit, skin.places, skin.sides, shape=skin.registered, guide=own.line)
+    avatar = find_margins(skin.surface, slit, skin.places, skin.sides, shape=skin.registered, guide=own)
     return None if avatar is None else (own, avatar)
 
 
 def find_margins(surface: Surface, slit: Slit, places: Places, sides: Array, *, shape: Array | None = None,
-                 guide: Array | None = None) -> Margins | None:
+                 guide: Margins | None = None) -> Margins | None:
     """Return the edges of a slit of the skin, or None where it has none: corners, or an edge's landmarks, are missing,
     both edges are one, as on a face with painted lids, or no way along the skin is near the landmarks.
 
-    places: landmark -> vertices (3,) and weights (3,). sides: `side_fields`. guide (2, g, 3): curves for the edges, in
-    the coordinates ``shape`` (n, 3); without, smooth curves through the landmarks, in the surface's own.
+    places: landmark -> vertices (3,) and weights (3,). sides: `side_fields`. guide: the template's edges, to which
+    those of the skin laid on it, ``shape`` (n, 3), keep; without, they follow smooth curves through the landmarks.
     """
     at = surface.vertices if shape is None else shape
     sign = sides[:, slit.side]
@@ -106,7 +111,7 @@ def find_margins(surface: Surface, slit: Slit, places: Places, sides: Array, *, 
         stops = _stops(slit, names, places)
         if stops is None:
             return None
-        line = _curve(at[stops]) if guide is None else guide[edge]
+        line = _curve(at[stops]) if guide is None else guide.line[edge]
         path = _way(surface, at, stops, line, up * sign)
         if path is None or _lengths(surface.vertices[path])[-1] > _LONGEST * _lengths(surface.vertices[stops])[-1]:
             return None
@@ -117,12 +122,16 @@ def find_margins(surface: Surface, slit: Slit, places: Places, sides: Array, *, 
         return None
     n = len(surface.vertices)
     along = [_along(surface.vertices[path]) for path in paths]
+    if guide is not None:
+        along = [_OWN * t + (1 - _OWN) * _beside(at[path], *edge)
+                 for t, path, edge in zip(along, paths, guide.paths, strict=True)]
     upper, lower = (_sampler(path, t, n) for path, t in zip(paths, along, strict=True))
     own = [~np.isin(path, both) for path in paths]
     rows = np.concatenate([path[keep] for path, keep in zip(paths, own, strict=True)])
     where = np.concatenate([t[keep] for t, keep in zip(along, own, strict=True)])
     is_upper = np.arange(len(rows)) < own[0].sum()
-    return Margins(upper, lower, rows, where, is_upper, both, np.array(lines))
+    return Margins(upper, lower, rows, where, is_upper, both, np.array(lines),
+                   tuple((at[path], t) for path, t in zip(paths, along, strict=True)))
 
 
 def _stops(slit: Slit, names: tuple[str, ...], places: Places) -> NDArray | None:
@@ -175,6 +184,19 @@ def _along(path: Array) -> Array:
     t = 0.5 * by_chord + 0.5 * by_way
     t[0], t[-1] = 0.0, 1.0
     return t
+
+
+def _beside(path: Array, edge: Array, t: Array) -> Array:
+    """Return where the places (p, 3) of an edge lie along a slit, by the nearest place of the template's edge (q, 3),
+    whose places lie at t (q,)."""
+    start, way = edge[:-1], np.diff(edge, axis=0)
+    share = np.einsum("pqi,qi->pq", path[:, None] - start, way) / np.maximum((way**2).sum(axis=1), 1e-300)
+    share = np.clip(share, 0.0, 1.0)
+    off = ((start + share[:, :, None] * way - path[:, None]) ** 2).sum(axis=2)
+    rows, nearest = np.arange(len(path)), off.argmin(axis=1)
+    found = np.maximum.accumulate(t[nearest] + share[rows, nearest] * np.diff(t)[nearest])
+    found[0], found[-1] = 0.0, 1.0
+    return found
 
 
 def _lengths(path: Array, least: float = 0.0) -> Array:

@@ -20,6 +20,7 @@ from facegen.transfer.eyeball import Eyeball, fit_eye
 from facegen.transfer.face_measures import FaceMeasures
 from facegen.transfer.piece_names import kind_of_name
 from facegen.transfer.pieces import Piece
+from facegen.transfer.tongue import Tongue
 
 Array = NDArray[np.float64]
 
@@ -72,12 +73,12 @@ class PieceMotion:
         self._linings = [_Lining(piece, self.vertices, skin, face) for piece in pieces if piece.kind == "mouth"]
 
     def move(self, skin_motion: ArrayLike, jaw: RigidMotions | None = None, gaze: ArrayLike | None = None, *,
-             tongue: ArrayLike | None = None) -> NDArray[np.float64]:
+             tongue: Tongue | None = None) -> NDArray[np.float64]:
         """Return the displacements (k, n, 3) of all vertices, mm.
 
         skin_motion (k, n, 3): the skin's; rows of other pieces are not read. jaw: k motions, none without. gaze
-        (k, 4): degrees, yaw of the left eye (to the subject's left), its pitch (up), and the right eye's. tongue
-        (k, n, 3): what the tongue does beside going with the jaw.
+        (k, 4): degrees, yaw of the left eye (to the subject's left), its pitch (up), and the right eye's. tongue: what
+        a template's does in the k shapes beside going with the jaw.
         """
         motion = np.array(skin_motion, float)
         k, n = motion.shape[0] if motion.ndim == 3 else 0, len(self.vertices)
@@ -99,10 +100,9 @@ class PieceMotion:
                 rows, turning = self.rows(f"eye_{s}"), (yaw != 0) | (pitch != 0)
                 motion[np.ix_(turning, rows)] = ball.turned(yaw[turning], pitch[turning], self.vertices[rows])
         if tongue is not None:
-            extra = np.asarray(tongue, float)
-            if extra.shape != motion.shape:
-                raise InputError(f"tongue: expected shape {motion.shape}, got {extra.shape}")
-            motion[:, self._tongue] += extra[:, self._tongue]
+            if len(tongue.motion) != k:
+                raise InputError(f"tongue: expected {k} motions, got {len(tongue.motion)}")
+            motion[:, self._tongue] += tongue.moves(self.vertices[self._tongue], self.face)
         for lining in self._linings:
             motion[:, lining.rows] = lining.move(motion, jaw)
         if self._carried is not None:
@@ -112,6 +112,14 @@ class PieceMotion:
     def rows(self, *kinds: str) -> NDArray[np.int64]:
         """Return the vertices of all pieces of some kinds."""
         return np.concatenate([p.vertices for p in self.pieces if p.kind in kinds] or [np.empty(0, np.int64)])
+
+    def surface(self, kind: str) -> Surface:
+        """Return all pieces of a kind as one surface of the vertices in `rows`."""
+        rows = self.rows(kind)
+        local = np.full(len(self.vertices), -1)
+        local[rows] = np.arange(len(rows))
+        faces = [self.faces[piece.faces] for piece in self.pieces if piece.kind == kind]
+        return Surface(self.vertices[rows], local[np.concatenate(faces)].astype(np.int32))
 
     def _eye(self, s: str, faces: NDArray, face: FaceMeasures) -> Eyeball:
         parts = []

@@ -19,6 +19,8 @@ from facegen.face.face import Face
 from facegen.face.motion import joined
 from facegen.geometry.closest import ClosestPoints
 from facegen.geometry.operators import Surface
+from facegen.transfer.face_measures import FaceMeasures
+from facegen.transfer.tongue import Tongue
 
 DETAIL = 2
 """Subdivision level of the template: about 11,000 triangles, 4 mm long."""
@@ -33,7 +35,7 @@ class Template:
     ``landmarks``: name -> place (3,); ``places``: name -> vertices (3,) of the skin and their weights (3,). ``motion``
     (k, n, 3) mm. ``jaw`` (k, 3): opening in degrees, side and forward in mm; ``gaze`` (k, 4): yaw and pitch in degrees,
     left eye then right. ``hinge``: how the jaw moves; ``jaw_share`` (n,): how much of it each vertex takes. ``minus``
-    (k,): the shape to take away from the result, or -1.
+    (k,): the shape to take away from the result, or -1. ``tongue``: how that moves beside going with the jaw, or None.
     """
 
     name: str
@@ -47,6 +49,7 @@ class Template:
     hinge: Jaw | None
     jaw_share: NDArray[np.float64]
     minus: tuple[int, ...]
+    tongue: Tongue | None = None
 
     @property
     def height(self) -> float:
@@ -79,9 +82,10 @@ def template_of(face: Face, shapes: Mapping[str, Recipe], *, detail: int = DETAI
     skin = mesh.part_vertices(mesh.parts[0])
     n = int(skin[-1]) + 1                                   # the skin comes first, all of its vertices are used
     surface = Surface(mesh.vertices[:n], mesh.faces[mesh.face_parts == 0])
-    places = _skin_places(face, surface, detail)
+    places = skin_places(face, surface, detail)
     together = joined(face, [shape.deformation for shape in shapes.values()])
-    motion = face.pose_controls(together, detail=detail)[:, :n] - surface.vertices
+    posed = face.pose_controls(together, detail=detail)
+    motion = posed[:, :n] - surface.vertices
     hinge = face.deformer.jaw
     opened = np.array([_TEST_OPENING, 0.0, 0.0])
     test = face.pose({"units": "millimetre", "jaw": {"open": _TEST_OPENING}}, detail=detail)[:n] - surface.vertices
@@ -90,11 +94,18 @@ def template_of(face: Face, shapes: Mapping[str, Recipe], *, detail: int = DETAI
     landmarks = {name: weights @ surface.vertices[rows] for name, (rows, weights) in places.items()}
     order = {name: row for row, name in enumerate(shapes)}
     minus = tuple(-1 if shape.minus is None else order[shape.minus] for shape in shapes.values())
+    tongue = None
+    if "tongue" in mesh.parts:
+        rows = mesh.part_vertices("tongue")
+        own = Surface(mesh.vertices[rows],
+                      np.searchsorted(rows, mesh.faces[mesh.face_parts == mesh.parts.index("tongue")]))
+        beside = posed[:, rows] - own.vertices - hinge.movement(own.vertices, together.jaw)
+        tongue = Tongue(own, beside, FaceMeasures(landmarks))
     return Template(face.name, surface, landmarks, places, tuple(shapes), motion, together.jaw, together.eyes,
-                    hinge, share, minus)
+                    hinge, share, minus, tongue)
 
 
-def _skin_places(face: Face, surface: Surface, detail: int) -> dict[str, tuple[NDArray, NDArray]]:
+def skin_places(face: Face, surface: Surface, detail: int) -> dict[str, tuple[NDArray, NDArray]]:
     """Return the landmarks on the skin: as they are defined, which tells lips that touch apart; those of other parts,
     the brows', at the nearest place. The pupils are none of the skin's."""
     mesh = face.mesh(detail)

@@ -30,6 +30,7 @@ from facegen.transfer.measured_motion import measured_gaze, measured_jaw
 from facegen.transfer.piece_motion import PieceMotion
 from facegen.transfer.sides import settled, side_fields
 from facegen.transfer.template import Template
+from facegen.transfer.tongue import Tongue
 
 LANDMARKS = "landmarks.yaml"
 """The landmarks' file in a folder of OBJ files."""
@@ -144,8 +145,13 @@ def _template(file: TemplateFile) -> Template:
     pieces = PieceMotion(parts.pieces, parts.vertices, parts.faces, parts.points)
     hinge, jaw, share = measured_jaw(pieces, motion)
     motion, jaw = motion[:len(names)], jaw[:len(names)]
+    tongue = None
+    if len(rows := pieces.rows("tongue")):
+        at = pieces.vertices[rows]
+        with_jaw = 0.0 if hinge is None else hinge.movement(at, jaw)
+        tongue = Tongue(pieces.surface("tongue"), motion[:, rows] - with_jaw, pieces.face)
     places = parts.places([name for name in landmarks.names if not name.startswith("eye_center")])
     places = settled(parts.surface, places, side_fields(parts.surface, places))
     points = {name: weights @ parts.surface.vertices[rows] for name, (rows, weights) in places.items()}
     return Template(file.avatar.path.stem, parts.surface, points, places, names, motion[:, parts.rows], jaw,
-                    measured_gaze(pieces, motion), hinge, share[parts.rows], minus)
+                    measured_gaze(pieces, motion), hinge, share[parts.rows], minus, tongue)

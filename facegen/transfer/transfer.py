@@ -93,8 +93,10 @@ def transfer(mesh: Mesh, landmarks: Landmarks, template: Template, *, method: st
         for slit in slits:
             slit.close(on_skin)
         jaw = None if skin.jaw is None else RigidMotions.of(lambda at: skin.jaw.movement(at, template.jaw))
-        motion = moved.move(_among_all(on_skin, rows, len(vertices)), jaw, template.gaze)
-        motion, contacts = keep_apart(moved, motion, template.gaze)
+        motion = moved.move(_among_all(on_skin, rows, len(vertices)), jaw, template.gaze, tongue=template.tongue)
+        # A tongue that comes out is before the lips, and is meant to be.
+        out = {} if template.tongue is None else {"tongue": np.where(template.tongue.comes_out() > 0, np.inf, 0.0)}
+        motion, contacts = keep_apart(moved, motion, template.gaze, allowed=out)
         if skin.copied:             # whatever pokes through it there
             motion[:, rows] = on_skin
         for slit in slits:

@@ -96,11 +96,11 @@ def test_the_jaw_never_passes_what_its_sounds_ask(drawn, effort):
 @settings(deadline=None, max_examples=8)
 @given(st.lists(phrases.flatmap(lambda rows: st.sampled_from(rows)), min_size=2, max_size=4))
 def test_nothing_jumps(drawn):
-    """Within 2 ms no share changes by more than a fifth: a movement takes some hundredths of a second."""
+    """Within 2 ms no share changes by more than a quarter: a movement takes some hundredths of a second."""
     speech = phrase(drawn)
     one, times = SpeechTrack("s", speech), np.arange(0.2, speech.duration - 0.1, 0.002)
     for channel in ("lips", "jaw"):
-        assert np.abs(np.diff(one.weights(times, channel)[1], axis=0)).max() < 0.2
+        assert np.abs(np.diff(one.weights(times, channel)[1], axis=0)).max() < 0.25
 
 
 @pytest.mark.parametrize("sound", ["p", "b", "m"])

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from facegen import load_performance
 from facegen.animation import espeak
 from facegen.fileio.sound import Sound, save_wav
 
@@ -41,6 +42,16 @@ def test_a_film(run, tmp_path):
     with Image.open(out) as film:
         assert film.n_frames > 3
     assert list(tmp_path.iterdir()) == [out]
+
+
+def test_an_animation_of_blendshapes(run, tmp_path):
+    out = tmp_path / "a.glb"
+    assert run("speak", "--phonemes", "M AA1", "-o", out, "--detail", "0", "--face", "akimoto") == (0, "", "")
+    made = load_performance(out)
+    closed, wide = made.column("AU24"), made.column("AU27")
+    m, a = (round(25 * t) for t in (0.25 + 0.035, 0.25 + 0.07 + 0.07))
+    assert closed[m] > 0.45 > 5 * wide[m]
+    assert wide[a] > 0.25 > closed[a]
 
 
 def test_what_json_prints_is_timing(run, tmp_path):

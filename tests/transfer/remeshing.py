@@ -8,10 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from facegen.face.face import load_face
+from facegen.face.motion import joined
 from facegen.facs.tables import load_units
 from facegen.geometry.closest import ClosestPoints
+from facegen.geometry.mesh import Mesh, merge
 from facegen.geometry.operators import Surface
-from facegen.transfer.template import Template, template_of
+from facegen.transfer.template import DETAIL, Template, template_of
 
 
 def template_of_units() -> Template:
@@ -39,6 +41,33 @@ def remesh(template: Template, share: float) -> tuple[Surface, NDArray]:
     surface = Surface(np.einsum("nc,nci->ni", feet.weights, template.surface.vertices[corners]),
                       faces.reshape(-1, 3).astype(np.int32))
     return surface, np.einsum("nc,knci->kni", feet.weights, template.motion[:, corners])
+
+
+def remesh_all(template: Template, share: float) -> tuple[Mesh, NDArray, NDArray]:
+    """Return the face with its eyes, teeth and tongue in other triangles, its true motion (k, n, 3), and which vertices
+    (n,) are the skin's. ImportError without fast_simplification."""
+    from fast_simplification import simplify
+
+    face = load_face()
+    whole = face.mesh(DETAIL)
+    several = [(one,) for name, one in load_units().basis.items() if not one.head]
+    motion = face.pose_controls(joined(face, several), detail=DETAIL) - whole.vertices
+    skin, true = remesh(template, share)
+    meshes, trues = [Mesh.of(skin.vertices, skin.faces)], [true]
+    for part in ("eye_L", "eye_R", "teeth_upper", "teeth_lower", "tongue"):
+        rows, own = np.unique(whole.faces[whole.face_parts == whole.parts.index(part)], return_inverse=True)
+        surface = Surface(whole.vertices[rows], own.reshape(-1, 3).astype(np.int32))
+        points, faces = _halved(surface.vertices, surface.faces)
+        points, faces = simplify(points.astype(np.float32), faces.astype(np.int32),
+                                 target_count=int(share * len(surface.faces)))
+        used, faces = np.unique(faces, return_inverse=True)
+        feet = ClosestPoints(surface)(points[used].astype(float))
+        corners = rows[surface.faces[feet.faces]]
+        meshes.append(Mesh.of(np.einsum("nc,nci->ni", feet.weights, whole.vertices[corners]), faces.reshape(-1, 3),
+                              material=part, part=part))
+        trues.append(np.einsum("nc,knci->kni", feet.weights, motion[:, corners]))
+    own = np.arange(sum(map(len, (mesh.vertices for mesh in meshes)))) < len(skin.vertices)
+    return merge(meshes), np.concatenate(trues, axis=1), own
 
 
 def errors(found: NDArray, true: NDArray) -> tuple[float, NDArray]:

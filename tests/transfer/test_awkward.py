@@ -1,5 +1,7 @@
 """Avatars as other people's files have them: the shapes of the plain avatar, or words about what cannot be done."""
 
+from types import SimpleNamespace
+
 import awkward
 import numpy as np
 import pytest
@@ -288,7 +290,9 @@ def test_an_edge_that_goes_round_the_head_is_none():
                          "eye_lower_L": (18, -13)}.items():
         near = int(np.linalg.norm(ball - [x, y, np.sqrt(3600 - x * x - y * y)], axis=1).argmin())
         places[name] = (np.full(3, near), np.array([1.0, 0.0, 0.0]))
-    flat = {"shape": np.zeros_like(ball), "guide": np.zeros((2, 5, 3))}             # laid on one place: no way is long
+    nowhere = np.zeros((2, 5, 3))
+    guide = SimpleNamespace(line=nowhere, paths=[(edge, np.arange(5) / 4) for edge in nowhere])
+    flat = {"shape": np.zeros_like(ball), "guide": guide}
     right = np.sign(ball[:, 1:2]) * [0.0, 1.0, 0.0]
     assert find_margins(surface, LIDS[0], places, right, **flat) is not None
     wall = np.isin(np.arange(len(ball)) % 20, (2, 3))[:, None]

@@ -57,7 +57,7 @@ def test_a_rim_moves_as_its_edge_does(rigged, skin_shapes, slit, name):
     rim = np.flatnonzero((to_upper < 0.1 * to_lower) & (to_upper > 0))
     assert len(rim) > 5
     away = np.linalg.norm(moved[rim] - moved[edge[nearest[rim]]], axis=1)
-    assert away.max() < 0.1 * gaps(rigged, slit, 0.0).max()
+    assert away.max() < 0.12 * gaps(rigged, slit, 0.0).max()
 
 
 def test_a_camera_sees_no_eye_through_shut_lids(rigged):

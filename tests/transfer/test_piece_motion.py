@@ -13,11 +13,15 @@ from piece_avatars import ball, disc, dressed, head, lashes, moustache, template
 from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
+from facegen.blendshapes.names import shape_of
+from facegen.blendshapes.recipes import shape_set
 from facegen.errors import InputError
 from facegen.face.face import load_face
 from facegen.transfer.eyeball import fit_eye, gaze_rotation
 from facegen.transfer.keep_apart import keep_apart
 from facegen.transfer.piece_motion import PieceMotion, RigidMotions
+from facegen.transfer.template import template_of
+from facegen.transfer.tongue import Tongue
 
 ANGLE = st.floats(-40, 40)
 
@@ -144,14 +148,21 @@ def test_the_base_face_s_own_parts():
 
 
 def test_a_tongue_s_own_motion_is_added():
-    avatar, moves, motion, jaw, gaze = posed("27E", "12E", "61E", "43E")
-    extra = np.zeros_like(motion)
-    extra[:, :, 2] = 4.0
-    out, plain = moves.move(motion, jaw, gaze, tongue=extra), moves.move(motion, jaw, gaze)
-    tongue = moves.rows("tongue")
-    np.testing.assert_allclose(out[:, tongue] - plain[:, tongue], extra[:, tongue], atol=1e-12)
-    others = np.setdiff1d(np.arange(len(avatar.vertices)), tongue)
+    """As the base face moves it, on the base face; from farther behind the lips it goes farther."""
+    whole = template_of(load_face(), shape_set("units"))
+    row = whole.names.index(shape_of("19"))
+    avatar, moves, motion, jaw, gaze = posed("19E")
+    tongue = Tongue(whole.tongue.surface, whole.tongue.motion[row:row + 1], whole.tongue.face)
+    out, plain = moves.move(motion, jaw, gaze, tongue=tongue), moves.move(motion, jaw, gaze)
+    rows = moves.rows("tongue")
+    np.testing.assert_allclose(out[:, rows], motion[:, rows], atol=1e-6)
+    assert np.linalg.norm(out[:, rows] - plain[:, rows], axis=2).max() > 10.0
+    others = np.setdiff1d(np.arange(len(avatar.vertices)), rows)
     np.testing.assert_array_equal(out[:, others], plain[:, others])
+    own = whole.tongue.surface.vertices
+    ahead = [tongue.moves(own - [0.0, 0.0, back], whole.tongue.face)[0, :, 2].max() for back in (0.0, 5.0)]
+    assert ahead[1] - ahead[0] == pytest.approx(5.0, rel=0.15)
+    assert tongue.comes_out()[0] > 5.0
 
 
 def with_part(name, at, faces):
@@ -387,8 +398,9 @@ def test_wrong_shapes():
         moves.move(rest, identity(3))
     with pytest.raises(InputError, match=r"gaze: expected shape \(2, 4\), got \(2, 2\)"):
         moves.move(rest, gaze=np.zeros((2, 2)))
-    with pytest.raises(InputError, match="tongue: expected shape"):
-        moves.move(rest, tongue=np.zeros((2, 3, 3)))
+    one = Tongue(moves.skin, np.zeros((1, n, 3)), moves.face)
+    with pytest.raises(InputError, match="tongue: expected 2 motions, got 1"):
+        moves.move(rest, tongue=one)
     with pytest.raises(InputError, match="motion: expected shape"):
         keep_apart(moves, rest[:, :5])
     with pytest.raises(InputError, match="gaze: expected shape"):

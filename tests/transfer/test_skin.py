@@ -2,12 +2,14 @@
 
 import numpy as np
 import pytest
-from remeshing import errors
+from remeshing import errors, remesh_all
 
 from facegen.geometry.operators import Surface
 from facegen.transfer.baselines import PAPER
+from facegen.transfer.landmarks import snap
 from facegen.transfer.skin import lay_skin
 from facegen.transfer.template import places_on
+from facegen.transfer.transfer import transfer
 
 
 def test_a_template_transferred_to_itself_gives_itself(template):
@@ -16,19 +18,27 @@ def test_a_template_transferred_to_itself_gives_itself(template):
     assert np.abs(skin.motion() - template.motion).max() < 1e-6 * template.height
 
 
-# A few gazes move the lids by tenths of a millimetre only, where the cornea lifts them; of these no share is asked.
-SLIGHT = {"61", "62", "65", "66"}
+# These move the lids by tenths of a millimetre only, where the cornea lifts them; of the skin alone no share is asked.
+GAZES = ("61", "62", "65", "66")
 
 
 @pytest.mark.parametrize(("share", "most"), [(0.3, 0.06), (0.4, 0.06), (1.0, 0.03), (2.0, 0.03)])
-def test_other_triangles_move_as_the_template_does(template, remeshed, share, most):
-    surface, true = remeshed(share)
-    found = lay_skin(template, surface, places_on(surface, template.landmarks)).motion()
-    whole, each = errors(found, true)
+def test_other_triangles_move_as_the_template_does(template, share, most):
+    """Eyes, teeth, tongue and all, by the door that an avatar goes through, its lids closed over its own eyes."""
+    pytest.importorskip("fast_simplification")
+    mesh, true, skin = remesh_all(template, share)
+    made = transfer(mesh, snap(template.landmarks, mesh), template).shapes
+    found = np.array([made[name] for name in template.names])
+    assert errors(found, true)[0] < most
+    whole, each = errors(found[:, skin], true[:, skin])
     assert whole < most
-    assert np.percentile(each[~np.isin(template.names, list(SLIGHT))], 99) < 0.1
-    assert set(np.array(template.names)[each > 0.15]) <= SLIGHT
-    slight = np.isin(template.names, list(SLIGHT))
+    of_all = errors(found, true)[1]
+    assert dict(zip(template.names, of_all.round(3), strict=True)) == pytest.approx(dict.fromkeys(template.names, 0),
+                                                                                     abs=0.17 if share < 0.4 else 0.15)
+    away = np.linalg.norm(found - true, axis=2) / np.linalg.norm(true, axis=2).max(axis=1)[:, None]
+    assert np.percentile(away, 99) < 0.07
+    slight = np.isin(template.names, GAZES)
+    assert each[~slight].max() < 0.17
     assert np.abs(found - true)[slight].max() < 2.0
 
 

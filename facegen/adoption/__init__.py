@@ -1,0 +1,1 @@
+"""A parametric face made out of a head's mesh."""
