@@ -158,6 +158,8 @@ def _by_library(text: str, voice: str, speed: float, wav: Path) -> tuple[list[Ti
             answer = json.loads(done.stdout)
             made, said = _timed(answer["events"], answer["rate"], answer["samples"])
             return closed_before(made, read_wav(wav)), said
+        if done.returncode == espeak_library.NO_VOICE:
+            raise InputError(f"language: espeak-ng has no '{voice}' (espeak-ng --voices lists what it has)")
     return None
 
 

@@ -15,6 +15,7 @@ import wave
 
 _SYNCHRONOUS, _PHONEME_EVENTS = 2, 1 | 2            # espeak_AUDIO_OUTPUT, espeakINITIALIZE_PHONEME_EVENTS and _IPA
 _PHONEME, _END = 7, 0                               # espeak_EVENT_TYPE
+NO_VOICE = 4
 _UTF8, _RATE = 1, 1                                 # espeakCHARS_UTF8, espeakRATE
 
 
@@ -35,7 +36,7 @@ class _Voice(ctypes.Structure):
 
 
 def main() -> int:
-    """Answer one request; 3 if the library or the voice cannot be had."""
+    """Answer one request; 3 if the library cannot be had, 4 if the voice cannot."""
     request = json.load(sys.stdin)
     try:
         library = ctypes.CDLL(request["library"])
@@ -66,7 +67,7 @@ def main() -> int:
     wanted = _Voice(languages=voice)                # en-gb is a language; its voice has another name
     if library.espeak_SetVoiceByName(voice) != 0 and library.espeak_SetVoiceByProperties(ctypes.byref(wanted)) != 0:
         print(f"no voice {request['voice']}", file=sys.stderr)
-        return 3
+        return NO_VOICE
     library.espeak_SetParameter(_RATE, int(request["rate"]), 0)
     text = request["text"].encode() + b"\0"
     if library.espeak_Synth(text, ctypes.c_size_t(len(text)), 0, 0, 0, _UTF8, None, None) != 0:

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import os
 import unicodedata
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -133,26 +134,29 @@ def captioned(picture: ArrayLike, text: str, height: int) -> NDArray[np.uint8]:
     pixels = over_colour(check_pixels(picture), _PAPER)
     sheet = Image.new("RGB", (pixels.shape[1], pixels.shape[0] + height), _PAPER)
     sheet.paste(Image.fromarray(pixels), (0, 0))
-    letters, room, font = round(0.62 * height), pixels.shape[1] - height, None
+    letters, load = round(0.62 * height), None
     for name in _FONTS:
         with suppress(OSError):
-            font = ImageFont.truetype(name, letters)
-            while font.size > 7 and font.getlength(text) > room:
-                font = ImageFont.truetype(name, font.size - 1)
+            ImageFont.truetype(name, letters)
+            load = partial(ImageFont.truetype, name)
             break
-    if font is None:
+    if load is None:
         text = unicodedata.normalize("NFKD", text).encode("ascii", "ignore").decode()
-        text, font = _fitted(text, letters, room)
+    text, font = _fitted(text, letters, pixels.shape[1] - height, load)
     ImageDraw.Draw(sheet).text((height / 2, pixels.shape[0] + height / 2), text, fill=_INK, font=font, anchor="lm")
     return np.asarray(sheet).copy()
 
 
-def _fitted(text: str, letters: int, width: int):
-    """Return the text and a font at which it fits the width: first smaller letters, then fewer."""
+def _fitted(text: str, letters: int, width: int, load: Callable[[int], Any] | None = None):
+    """Return the text and a font at which it fits the width: first smaller letters, then fewer.
+
+    load: makes the font of a size; Pillow's own by default.
+    """
     from PIL import ImageFont
 
+    load = load or ImageFont.load_default
     for size in range(letters, 7, -1):
-        font = ImageFont.load_default(size)
+        font = load(size)
         if font.getlength(text) <= width:
             return text, font
     while text and font.getlength(text + "…") > width:

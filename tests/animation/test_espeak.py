@@ -82,6 +82,16 @@ def test_wrong_languages_and_texts():
     assert "de" in espeak.languages()
 
 
+@pytest.mark.usefixtures("there")
+def test_a_library_without_the_program(monkeypatch):
+    monkeypatch.setattr(espeak, "_program", lambda: None)
+    if not espeak._libraries():
+        pytest.skip("the library of espeak-ng is not installed")
+    assert espeak.speak("hallo", language="de").speech.visemes
+    with pytest.raises(InputError, match="language: espeak-ng has no 'xx'"):
+        espeak.speak("hello", language="xx")
+
+
 def test_without_espeak_the_message_says_how_to_get_it(monkeypatch):
     monkeypatch.setattr(espeak, "_program", lambda: None)
     monkeypatch.setattr(espeak, "_libraries", lambda: [])
