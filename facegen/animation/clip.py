@@ -21,7 +21,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache, cached_property
 from types import MappingProxyType
-from typing import ClassVar, Protocol
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,6 +38,9 @@ from facegen.facs.expressions import Resolution, resolve
 from facegen.facs.tables import load_units
 from facegen.facs.units import split_code
 from facegen.fileio.sound import Sound
+
+if TYPE_CHECKING:
+    from facegen.animation.layer import Layer
 
 LONGEST = 86_400.0
 """Seconds: a day."""
@@ -189,41 +192,6 @@ class Track:
         there = self.keyframes[after]
         done = eased(there.ease, (t - here.t) / (there.t - here.t))
         return [(share, pose) for share, pose in ((1.0 - done, here.pose), (done, there.pose)) if share > 0.0]
-
-
-class Layer(Protocol):
-    """What a clip is laid of: a `Track`, or speech (`facegen.animation.coarticulation.SpeechTrack`).
-
-    optional: its raw data are left out on a face that lacks the points for them.
-    """
-
-    name: str
-    optional: bool
-
-    @property
-    def end(self) -> float:
-        """When it is over, seconds."""
-
-    @property
-    def begins(self) -> float:
-        """When the last thing in it begins, seconds."""
-
-    @property
-    def corners(self) -> tuple[float, ...]:
-        """Times that show how far it reaches, seconds."""
-
-    @property
-    def poses(self) -> tuple[Pose, ...]:
-        """Every pose in it."""
-
-    def shares(self, t: float) -> list[tuple[float, Pose]]:
-        """Return the poses that are there at a time, each with its strength 0..1."""
-
-    def fades(self, t: float) -> list[tuple[str | frozenset[str], float]]:
-        """Return which atoms below fade at a time, or "all", and to what share."""
-
-    def mirrored(self) -> Layer:
-        """Return the same with left and right changed."""
 
 
 @dataclass(frozen=True)

@@ -8,10 +8,11 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from facegen.animation.angles import AXES, turned
-from facegen.animation.clip import LONGEST, Clip, Event, Keyframe, Layer, Pose, Track, joined, pose_of
+from facegen.animation.clip import LONGEST, Clip, Event, Keyframe, Pose, Track, joined, pose_of
 from facegen.animation.coarticulation import SpeechTrack
 from facegen.animation.easing import DEFAULT_EASE, EASES
 from facegen.animation.idle import Idle
+from facegen.animation.layer import Layer
 from facegen.animation.speech_script import read_speech_entry
 from facegen.animation.timing import load_timing
 from facegen.errors import FacegenError, InputError, TableError

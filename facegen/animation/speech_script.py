@@ -5,10 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-from facegen.animation.clip import LONGEST, Clip, Event, Layer, Track, pose_of
+from facegen.animation.clip import LONGEST, Clip, Event, Track, pose_of
 from facegen.animation.coarticulation import SpeechTrack
 from facegen.animation.espeak import speak
 from facegen.animation.idle import Idle
+from facegen.animation.layer import Layer
 from facegen.animation.phonemes import ALPHABETS
 from facegen.animation.speech import Speech, speech_of
 from facegen.animation.speech_files import SUFFIXES, read_speech

@@ -32,7 +32,6 @@ from facegen.render.dress import dressed
 from facegen.render.render import Renderer, render
 from facegen.render.scene import Scene
 
-VIEWS = ("front", "profile", "cut open")
 STILLS = (".png", ".webp", ".jpg", ".jpeg")
 MOST_STILLS = 200
 """Pictures on one sheet."""
