@@ -53,6 +53,8 @@ def test_files_lie_beside_the_script_and_sounds_are_mixed(tmp_path):
     clip = facegen.load_clip(script)
     assert clip.duration == pytest.approx(3.8)
     assert clip.sound.duration == pytest.approx(4.0)
+    assert clip.shown.sound is None                         # workers that draw need not have it
+    assert clip.shown.tracks == clip.tracks
     heard = clip.sound.samples[[4000, 12_000, 20_000, 28_000]]
     assert heard.tolist() == [0, 1000, 0, 1000]
 
