@@ -8,8 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw
 
-from facegen import Wireframe, load_face, render, render_passes, rig, save_image, save_passes
+from facegen import Wireframe, contact_sheet, load_face, render, render_passes, rig, save_image, save_passes
+from facegen.animation.speech_script import say, speech_clip
 from facegen.cli import main
+from facegen.jobs.lesson import lesson, save_lesson_sheet
 
 IMAGES = Path(__file__).parent / "images"
 FACE = load_face()
@@ -43,6 +45,18 @@ def pass_strip() -> NDArray[np.uint8]:
     for (x, y), visible in zip(points.xy, points.visible, strict=True):
         draw.ellipse((x - 2.5, y - 2.5, x + 2.5, y + 2.5), fill=(20, 150, 70) if visible else (200, 40, 40))
     return strip([*shown, np.asarray(picture)])
+
+
+def said() -> NDArray[np.uint8]:
+    """Return the middles of the sounds of "my baby" in a row each: at rest, and over a smile."""
+    rows, labels = [], []
+    for below in (None, "happiness"):
+        words = say(phonemes="M AY1 B EY1 B IY0")
+        clip = speech_clip(words, expression=None if below is None else FACE.resolve(below))
+        for start, end, label, _ in words.speech.visemes:
+            rows.append(render(FACE, clip.at((start + end) / 2), size=160))
+            labels.append(label)
+    return contact_sheet(rows, labels, columns=len(rows) // 2)
 
 
 def avatars() -> NDArray[np.uint8]:
@@ -94,6 +108,8 @@ if __name__ == "__main__":
     save_image(strip([render(FACE, "anger", size=SIZE, view=(35, 0), shadows=shadows) for shadows in (False, True)]),
                IMAGES / "shadows.webp")
     save_image(pass_strip(), IMAGES / "passes.webp")
+    save_image(said(), IMAGES / "speech.webp")
+    save_lesson_sheet(lesson("p, f, θ, t, k, ʃ, s, n, ɹ, ɑ, ɛ, i, ɔ, u"), IMAGES / "sounds.webp", size=160, columns=2)
     save_image(avatars(), IMAGES / "avatars.webp")
     save_image(layouts(), IMAGES / "layouts.webp")
     with tempfile.TemporaryDirectory() as folder:

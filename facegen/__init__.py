@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from facegen.animation.performance import Performance
     from facegen.animation.playback import Playback
     from facegen.animation.script import load_clip, morph
+    from facegen.animation.speech_script import say, speech_clip
     from facegen.animation.streams.files import load_performance, save_performance
     from facegen.blendshapes.recipes import Recipe, shape_set
     from facegen.errors import FacegenError, FileError, InputError, JobError, NotationError, TableError
@@ -108,7 +109,9 @@ __all__ = [
     "save_performance",
     "save_turn",
     "save_video",
+    "say",
     "shape_set",
+    "speech_clip",
 ]
 
 # Where each name lives. Read on first use (PEP 562), so that `import facegen` costs nothing.
@@ -117,6 +120,7 @@ _HOMES = {
     "facegen.animation.performance": ("Performance",),
     "facegen.animation.playback": ("Playback",),
     "facegen.animation.script": ("load_clip", "morph"),
+    "facegen.animation.speech_script": ("say", "speech_clip"),
     "facegen.animation.streams.files": ("load_performance", "save_performance"),
     "facegen.blendshapes.recipes": ("Recipe", "shape_set"),
     "facegen.errors": ("FacegenError", "FileError", "InputError", "JobError", "NotationError", "TableError"),

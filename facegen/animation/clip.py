@@ -21,6 +21,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache, cached_property
 from types import MappingProxyType
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,6 +37,10 @@ from facegen.facs.deformation import Deformation, weighted_sum
 from facegen.facs.expressions import Resolution, resolve
 from facegen.facs.tables import load_units
 from facegen.facs.units import split_code
+from facegen.fileio.sound import Sound
+
+if TYPE_CHECKING:
+    from facegen.animation.layer import Layer
 
 LONGEST = 86_400.0
 """Seconds: a day."""
@@ -45,6 +50,7 @@ _MIRROR |= {b: a for a, b in _MIRROR.items()}
 _TURNS = (("51", "52"), ("53", "54"), ("55", "56"), ("61", "62"))
 
 Weights = Mapping[str, float]
+_Shares = list[tuple[float, Deformation]]
 
 
 @dataclass(frozen=True)
@@ -126,6 +132,7 @@ class Track:
     keyframes: tuple[Keyframe, ...] = ()
     events: tuple[Event, ...] = ()
     replaces: str | frozenset[str] = frozenset()
+    optional: ClassVar[bool] = False
 
     def __post_init__(self) -> None:
         if bool(self.keyframes) == bool(self.events):
@@ -141,6 +148,19 @@ class Track:
         return max([key.t for key in self.keyframes] + [event.end for event in self.events])
 
     @property
+    def begins(self) -> float:
+        """When the last keyframe stands or the last event begins, seconds."""
+        return max([key.t for key in self.keyframes] + [event.at for event in self.events])
+
+    @property
+    def corners(self) -> tuple[float, ...]:
+        """The times at which movements begin and end, seconds."""
+        found = [key.t for key in self.keyframes]
+        for one in self.events:
+            found += (one.at, one.at + one.onset, one.at + one.onset + one.apex, one.end)
+        return tuple(found)
+
+    @property
     def poses(self) -> tuple[Pose, ...]:
         """Every pose in it."""
         return tuple(one.pose for one in (*self.keyframes, *self.events))
@@ -148,6 +168,16 @@ class Track:
     @cached_property
     def _times(self) -> tuple[float, ...]:
         return tuple(key.t for key in self.keyframes)
+
+    def mirrored(self) -> Track:
+        """Return the track with left and right changed."""
+        return replace(self, keyframes=tuple(replace(key, pose=key.pose.mirrored()) for key in self.keyframes),
+                       events=tuple(replace(event, pose=event.pose.mirrored()) for event in self.events),
+                       replaces=self.replaces if self.replaces == "all" else frozenset(map(_mirrored, self.replaces)))
+
+    def fades(self, t: float) -> list[tuple[str | frozenset[str], float]]:
+        """Return which atoms below fade at a time, or "all", and to what share."""
+        return [(self.replaces, 1.0 - min(1.0, sum(share for share, _ in self.shares(t))))]
 
     def shares(self, t: float) -> list[tuple[float, Pose]]:
         """Return the poses that are there at a time, each with its strength 0..1."""
@@ -168,16 +198,18 @@ class Track:
 class Clip(Timed):
     """Timed poses in tracks, ``duration`` seconds long; make one with `load_clip` or `morph`.
 
-    ``warnings``: what its poses were warned of. ::
+    ``warnings``: what its poses were warned of. ``sound``: what is heard meanwhile, from the first moment on; films
+    that can have sound get it. ::
 
         for pose in clip.sample(25):
             pixels = renderer.draw(pose)
     """
 
-    tracks: tuple[Track, ...]
+    tracks: tuple[Layer, ...]
     duration: float
     idle: Idle | None = None
     warnings: tuple[str, ...] = ()
+    sound: Sound | None = None
 
     def __post_init__(self) -> None:
         if isinstance(self.duration, bool) or not isinstance(self.duration, numbers.Real) \
@@ -193,7 +225,7 @@ class Clip(Timed):
 
         It goes wherever a pose goes: ``renderer.draw(clip.at(1.5))``. Before 0 and after the end the clip holds.
         """
-        atoms, raw = self._mixed(t)
+        atoms, raw, optional = self._mixed(t)
         table = load_units()
         units = table.catalogue.fold(atoms)
         total = weighted_sum([(value, table.basis[name]) for name, value in table.coefficients(units).items()])
@@ -208,7 +240,7 @@ class Clip(Timed):
             sums = [weighted_sum(terms) for terms in of.values() if terms]
             total, more = sums[0], sums[1:]
         return Resolution(self, "units" if units or not raw else "deformation", f"{t:.3f} s", None, units, total,
-                          more=tuple(more))
+                          more=tuple(more), optional=(weighted_sum(optional),) if optional else ())
 
     def sample(self, fps: float = 25.0) -> Iterator[Resolution]:
         """Return the frames one after the other, each as `at` gives it."""
@@ -216,28 +248,27 @@ class Clip(Timed):
 
     def mirrored(self) -> Clip:
         """Return the clip with left and right changed; the idle layer is left as it is."""
-        return replace(self, tracks=tuple(map(_mirrored_track, self.tracks)))
+        return replace(self, tracks=tuple(track.mirrored() for track in self.tracks))
 
     @property
     def raw(self) -> tuple[Deformation, ...]:
         """The raw data in its poses."""
-        return tuple(pose.raw for track in self.tracks for pose in track.poses if pose.raw is not None)
+        return tuple(pose.raw for track in self.tracks if not track.optional for pose in track.poses
+                     if pose.raw is not None)
 
     @property
     def corners(self) -> tuple[float, ...]:
         """The times at which movements begin and end, seconds, each once."""
         found = {0.0, self.duration}
         for track in self.tracks:
-            found.update(key.t for key in track.keyframes)
-            for one in track.events:
-                found.update((one.at, one.at + one.onset, one.at + one.onset + one.apex, one.end))
+            found.update(track.corners)
         return tuple(sorted(t for t in found if t <= self.duration))
 
     # -- as a motion to be filmed, see facegen.animation.motion -----------------------------------------------
     @property
     def shown(self) -> Clip:
-        """What workers need: the clip itself, whose cues are times."""
-        return self
+        """What workers need: the clip itself, whose cues are times; without its sound, which no frame shows."""
+        return self if self.sound is None else replace(self, sound=None)
 
     def cue(self, t: float) -> float:
         """Return the time."""
@@ -273,26 +304,32 @@ class Clip(Timed):
         """Return what to warn of on a rig; InputError if raw data name what it has not."""
         return tuple(dict.fromkeys(warning for raw in self.raw for warning in rig.check(resolve(raw))))
 
-    def _mixed(self, t: float) -> tuple[dict[str, float], list[tuple[float, Deformation]]]:
-        """Return atom -> weight and shares of raw data at a time."""
+    def _mixed(self, t: float) -> tuple[dict[str, float], _Shares, _Shares]:
+        """Return atom -> weight, shares of raw data, and shares of those that are optional, at a time."""
         if isinstance(t, bool) or not isinstance(t, numbers.Real) or not math.isfinite(t):
             raise InputError(f"t: expected a time in seconds, got {t!r}")
         t = min(max(float(t), 0.0), self.duration)
         atoms: dict[str, float] = {}
-        raw: list[tuple[float, Deformation]] = []
+        raw: _Shares = []
+        optional: _Shares = []
         for track in self.tracks:
             shares = track.shares(t)
             if not shares:
                 continue
-            kept = 1.0 - min(1.0, sum(share for share, _ in shares))
-            if track.replaces == "all":
-                atoms = {atom: weight * kept for atom, weight in atoms.items()}
-                raw = [(share * kept, one) for share, one in raw if kept]
-            else:
-                atoms.update((atom, atoms[atom] * kept) for atom in track.replaces if atom in atoms)
+            for which, kept in track.fades(t):
+                if which == "all":
+                    atoms = {atom: weight * kept for atom, weight in atoms.items()}
+                    raw, optional = ([(share * kept, one) for share, one in several if kept]
+                                     for several in (raw, optional))
+                else:
+                    atoms.update((atom, atoms[atom] * kept) for atom in which if atom in atoms)
             mine = [(share, pose.raw) for share, pose in shares if pose.raw is not None]
             beyond = max(1.0, math.fsum(share for share, _ in mine))
-            raw += [(share / beyond, one) for share, one in mine]
+            mine = [(share / beyond, one) for share, one in mine]
+            if track.optional:
+                optional += mine
+            else:
+                raw += mine
             _add(atoms, shares)
         if self.idle is not None:
             _add(atoms, [(1.0, Pose(self.idle.at(t)))])
@@ -300,7 +337,7 @@ class Clip(Timed):
             if one in atoms and other in atoms:
                 both = min(atoms[one], atoms[other])
                 atoms[one], atoms[other] = atoms[one] - both, atoms[other] - both
-        return {atom: weight for atom, weight in atoms.items() if weight}, raw
+        return {atom: weight for atom, weight in atoms.items() if weight}, raw, optional
 
 
 @cache
@@ -327,12 +364,6 @@ def _add(atoms: dict[str, float], shares: Sequence[tuple[float, Pose]]) -> None:
 def _mirrored(atom: str) -> str:
     mark, number = split_code(atom)
     return {"L": "R", "R": "L"}.get(mark, mark) + _MIRROR.get(number, number)
-
-
-def _mirrored_track(track: Track) -> Track:
-    return replace(track, keyframes=tuple(replace(key, pose=key.pose.mirrored()) for key in track.keyframes),
-                   events=tuple(replace(event, pose=event.pose.mirrored()) for event in track.events),
-                   replaces=track.replaces if track.replaces == "all" else frozenset(map(_mirrored, track.replaces)))
 
 
 def _check_time(name: str, value: object) -> None:

@@ -9,8 +9,11 @@ from pathlib import Path
 
 from facegen.animation.angles import AXES, turned
 from facegen.animation.clip import LONGEST, Clip, Event, Keyframe, Pose, Track, joined, pose_of
+from facegen.animation.coarticulation import SpeechTrack
 from facegen.animation.easing import DEFAULT_EASE, EASES
 from facegen.animation.idle import Idle
+from facegen.animation.layer import Layer
+from facegen.animation.speech_script import read_speech_entry
 from facegen.animation.timing import load_timing
 from facegen.errors import FacegenError, InputError, TableError
 from facegen.facs.expression_table import Person, is_path, load_person
@@ -18,6 +21,7 @@ from facegen.facs.expressions import Resolution, resolve
 from facegen.facs.tables import load_units
 from facegen.facs.validate import Entry
 from facegen.facs.yamlfile import read_data
+from facegen.fileio.sound import Sound, mixed
 
 _POSE = ("pose", "head", "eyes", "intensity")
 _PARTS = ("onset", "apex", "offset")
@@ -78,32 +82,38 @@ class _Reader:
     def __init__(self, root: Entry, folder: Path, person: str | Path | Person | None) -> None:
         self.root, self.folder = root, folder
         self.fields = root.fields(optional=("about", "duration", "person", "intensity", "idle", "keyframes", "events",
-                                            "tracks"))
+                                            "tracks", "speech"))
         self.person = load_person(person) if person is not None else self._person()
         self.intensity = self.fields["intensity"].number(0.0, 1.0) if "intensity" in self.fields else 1.0
         self.warnings: list[str] = []
+        self.sounds: list[tuple[float, Sound]] = []
 
     def clip(self, idle: int | Idle | None) -> Clip:
         """Return the whole clip; ``idle`` goes before the script's own."""
         fields = self.fields
         if "about" in fields:
             fields["about"].text()
-        tracks = [self._track(key, {key: fields[key]}) for key in ("keyframes", "events") if key in fields]
+        tracks: list[Layer] = [self._track(key, {key: fields[key]}) for key in ("keyframes", "events")
+                               if key in fields]
         for k, entry in enumerate(fields["tracks"].each() if "tracks" in fields else ()):
-            inner = entry.fields(optional=("name", "replace", "keyframes", "events"))
-            if ("keyframes" in inner) == ("events" in inner):
-                raise entry.fail("a track has either keyframes or events; write two tracks for both")
-            tracks.append(self._track(inner["name"].text() if "name" in inner else f"track {k + 1}", inner))
+            inner = entry.fields(optional=("name", "replace", "keyframes", "events", "speech"))
+            if sum(key in inner for key in ("keyframes", "events", "speech")) != 1:
+                raise entry.fail("a track has either keyframes or events or speech; write a track for each")
+            name = inner["name"].text() if "name" in inner else f"track {k + 1}"
+            tracks.append(self._speech(name, inner) if "speech" in inner else self._track(name, inner))
+        if "speech" in fields:
+            tracks.append(self._speech("speech", {"speech": fields["speech"]}))
         moved = any(atom in _EYES for track in tracks for pose in track.poses for atom in pose.atoms) \
             or any(pose.raw is not None and pose.raw.eyes for track in tracks for pose in track.poses)
         layer = _idle(idle) if idle is not None else self._idle()
         if layer is not None and moved:
             layer = dataclasses.replace(layer, glances=False)       # the script says where the eyes go
         if not tracks and layer is None:
-            raise self.root.fail("nothing happens: give keyframes, events, tracks or idle")
-        return Clip(tuple(tracks), self._duration(tracks), layer, tuple(dict.fromkeys(self.warnings)))
+            raise self.root.fail("nothing happens: give keyframes, events, speech, tracks or idle")
+        return Clip(tuple(tracks), self._duration(tracks), layer, tuple(dict.fromkeys(self.warnings)),
+                    mixed(self.sounds))
 
-    def _duration(self, tracks: list[Track]) -> float:
+    def _duration(self, tracks: list[Layer]) -> float:
         """Return the clip's length, by default until all is over."""
         end = max((track.end for track in tracks), default=0.0)
         if "duration" not in self.fields:
@@ -115,11 +125,19 @@ class _Reader:
         if duration == 0.0:
             raise entry.wrong("a number of seconds above 0")
         for track in tracks:
-            late = max([key.t for key in track.keyframes] + [event.at for event in track.events])
+            late = track.begins
             if late > duration:
                 raise entry.fail(f"the clip ends at {duration:g} s, but in {track.name} something begins at "
                                  f"{late:g} s: raise duration or leave it out")
         return duration
+
+    def _speech(self, name: str, fields: Mapping[str, Entry]) -> SpeechTrack:
+        said = read_speech_entry(fields["speech"], self.folder)
+        self.warnings += said.speech.warnings
+        if said.sound is not None:
+            self.sounds.append((said.at, said.sound))
+        replaces = self._replaces(fields) if "replace" in fields else None
+        return SpeechTrack(name, said.speech.later(said.at), said.effort, replaces)
 
     def _track(self, name: str, fields: Mapping[str, Entry]) -> Track:
         kind = "keyframes" if "keyframes" in fields else "events"

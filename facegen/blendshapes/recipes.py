@@ -45,6 +45,7 @@ class Recipe:
     members: member of the unit table's basis -> coefficient, if the shape is nothing else; else empty.
     script: the recipe as the table has it, to be read. set, about, source: where it belongs, what is seen, where
         that comes from. also: what other people call it.
+    weights: unit -> weight of an entry's units and jaw as written, before they are combined; no raw data.
     """
 
     deformation: tuple[Deformation, ...]
@@ -55,13 +56,15 @@ class Recipe:
     about: str = ""
     source: str = ""
     also: tuple[str, ...] = ()
+    weights: Mapping[str, float] = field(default_factory=dict, hash=False)
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "members", MappingProxyType(dict(self.members)))
+        for name in ("members", "weights"):
+            object.__setattr__(self, name, MappingProxyType(dict(getattr(self, name))))
 
     def __reduce__(self) -> tuple:                  # mapping proxies cannot be pickled
         return Recipe, (self.deformation, self.minus, dict(self.members), self.script, self.set, self.about,
-                        self.source, self.also)
+                        self.source, self.also, dict(self.weights))
 
 
 def shape_set(name: str, person: str | Path | Person | None = None) -> dict[str, Recipe]:
@@ -183,11 +186,14 @@ class _Set:
             members = {_mirrored(m): value for m, value in one.members.items()}
             if not set(members) <= set(load_units().basis) or _sum(members) != image:
                 members = {}                            # the mirror image of a turn to the left is another unit
-            return replace(one, deformation=(image,), members=members, about=_swapped(one.about), also=also,
+            return replace(one, deformation=(image,), members=members, weights={}, about=_swapped(one.about), also=also,
                            script=f"mirror image of {other}")
         if "about" not in fields:
             raise entry.fail("the key 'about' is missing")
-        members = self._members(fields)
+        weights = self._weights(fields)
+        members = load_units().coefficients(weights)
+        if any(map(is_head, members)):
+            raise fields["units"].fail("units of the head (51 to 58) are no shapes")
         made = _sum(members)
         if "half" in fields:
             made, members = half(made, fields["half"].choice(("L", "R"), "half")), {}
@@ -200,10 +206,11 @@ class _Set:
         if "corrects" in fields:
             minus = self._other(fields["corrects"], shape)
             made = _added(entry, made, *self._recipe(minus).deformation)
-        return Recipe((made,), minus, members, _script(fields), self.name, fields["about"].text(), self.source, also)
+        return Recipe((made,), minus, members, _script(fields), self.name, fields["about"].text(), self.source, also,
+                      weights)
 
-    def _members(self, fields: Mapping[str, Entry]) -> dict[str, float]:
-        """Return the coefficients of an entry's units and jaw."""
+    def _weights(self, fields: Mapping[str, Entry]) -> dict[str, float]:
+        """Return the weights of an entry's units and jaw."""
         weights: dict[str, float] = {}
         if "units" in fields:
             value = fields["units"].value               # a bare 0 or 17 reads as a number
@@ -215,10 +222,7 @@ class _Set:
             if _WIDEST in weights:
                 raise fields["jaw"].fail(f"the jaw is given twice: leave out unit {_WIDEST}")
             weights[_WIDEST] = fields["jaw"].number(0.0, 1.0)
-        members = load_units().coefficients(weights)
-        if any(map(is_head, members)):
-            raise fields["units"].fail("units of the head (51 to 58) are no shapes")
-        return members
+        return weights
 
     def _other(self, entry: Entry, shape: str) -> str:
         other = entry.choice(self.entries, "shape")

@@ -12,7 +12,19 @@ import typer
 
 from facegen import __version__
 from facegen.cli import adopt as adopting
-from facegen.cli import batch, convert, explain, figures, film, gallery, listing, picture, play
+from facegen.cli import (
+    batch,
+    convert,
+    explain,
+    figures,
+    film,
+    gallery,
+    listing,
+    phoneme,
+    picture,
+    play,
+    speak,
+)
 from facegen.cli import fit as fitting
 from facegen.cli import rig as rigging
 from facegen.errors import FacegenError, InputError
@@ -37,6 +49,8 @@ app.command("turntable")(film.turntable)
 app.command("play")(play.play)
 app.command("rig")(rigging.rig)
 app.command("fit")(fitting.fit)
+app.command("speak")(speak.speak)
+app.command("phoneme")(phoneme.phoneme)
 app.command("convert")(convert.convert)
 app.command("adopt")(adopting.adopt)
 

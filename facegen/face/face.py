@@ -197,7 +197,8 @@ class Face:
         cannot be understood.
         """
         found = self.resolve(what, person=person, intensity=intensity)
-        controls = self.controls(found.deformation, *found.more, strict=not found.units)
+        strict = not (found.units or found.optional)
+        controls = self.controls(found.deformation, *found.more, *found.optional, strict=strict)
         return self.pose_controls(controls, detail=detail)
 
     def resolve(self, what: Any, *, person: Any = None, intensity: float = 1.0) -> Resolution:

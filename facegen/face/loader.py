@@ -25,6 +25,7 @@ from facegen.geometry.subdivision import Subdivision, loop_levels
 
 REQUIRED = ("name", "source", "cage", "centre_O", "measures", "scales", "points", "regions", "jaw", "eyes",
             "lids", "head")
+_PULL_DOWN = 0.6        # how far down a point's pull on a part reaches, as a share of its reach
 OPTIONAL = ("sheets", "followers", "creases", "corners", "parts", "folds", "lid_follow", "head_half_height",
             "landmarks", "surface", "eye_size", "colours")
 CARRIERS = ("skull", "skin", "jaw", "eye", "mouth")
@@ -99,9 +100,10 @@ def read_face(path: Path) -> FaceData:
     jaw = Jaw(place(jaw_fields["hinge"]), place(jaw_fields["glide"]), rule)
     names: list[str] = []
     takes_input: list[bool] = []
-    places, point_scale, jaw_share, point_vertices, aliases, with_parts = [], [], [], [], {}, {}
+    places, point_scale, jaw_share, point_vertices, aliases = [], [], [], [], {}
+    with_parts: dict[str, dict[int, float | None]] = {}     # part -> row of a point -> how far its pull reaches
     for name, entry in top["points"].items():
-        fields = entry.fields(required=("role", "scale"), optional=("vertex", "at", "jaw", "paper", "part"))
+        fields = entry.fields(required=("role", "scale"), optional=("vertex", "at", "jaw", "paper", "part", "reach"))
         if ("vertex" in fields) == ("at" in fields):
             raise entry.fail("a feature point needs either vertex or at")
         role = fields["role"].choice(ROLES, "role")
@@ -110,9 +112,17 @@ def read_face(path: Path) -> FaceData:
         places.append(place(fields["at"]) if "at" in fields else cage.vertices[point_vertices[-1]])
         point_scale.append(scales[fields["scale"].choice(scales, "scale")])
         jaw_share.append(fields["jaw"].number(0, 1) if "jaw" in fields else 0.0)
-        for key, rows in (("paper", aliases), ("part", with_parts)):
-            if key in fields and rows.setdefault(fields[key].text(), len(names)) != len(names):
-                raise fields[key].fail(f"'{fields[key].text()}' is given to two feature points")
+        if "paper" in fields and aliases.setdefault(fields["paper"].text(), len(names)) != len(names):
+            raise fields["paper"].fail(f"'{fields['paper'].text()}' is given to two feature points")
+        reach = fields["reach"].number(1.0, 1e4) if "reach" in fields else None
+        if "part" in fields:
+            pulls = with_parts.setdefault(fields["part"].text(), {})
+            if reach is None and None in pulls.values():
+                raise fields["part"].fail(f"'{fields['part'].text()}' is given to two feature points; all but the "
+                                          "foremost need reach")
+            pulls[len(names)] = reach
+        elif reach is not None:
+            raise fields["reach"].fail("only the pull on a part has a reach; give part")
         names.append(name)
     at = {name: i for i, name in enumerate(names)}
 
@@ -190,10 +200,10 @@ def read_face(path: Path) -> FaceData:
     attachments = tuple(_part(e, path.parent, load, cage, surface, eyes, with_parts, np.array(places))
                         for e in (top["parts"].each() if "parts" in top else ()))
     parts = [a.mesh.parts[0] for a in attachments]
-    for part, row in with_parts.items():
+    part_of = {row: part for part, pulls in with_parts.items() for row in pulls}
+    for row, part in part_of.items():
         if part not in parts:
             Entry(part, str(path), f"points.{names[row]}.part").choice(parts, "part")
-    part_of = {row: part for part, row in with_parts.items()}
     marks = path.parent / (top["landmarks"].text() if "landmarks" in top else "landmarks.yaml")
     if "landmarks" in top and not marks.is_file():
         raise top["landmarks"].wrong("the path of a file that exists")
@@ -255,8 +265,20 @@ def _relief(entry: Entry, folder: Path, cage: Mesh, creases: NDArray, corners: N
     return surface.vertices - smooth.matrix @ cage.vertices
 
 
+def _pull(vertices: Array, at: Array, reach: float | None) -> Array:
+    """Return how far (n,) a point at ``at`` (3,) pulls along the vertices (n, 3) of its part.
+
+    Without a reach it is the foremost: all before it goes along, and the pull fades backward. With one it fades to both
+    ways and, sooner, downward: a tongue rises from the floor of the mouth, which keeps its underside.
+    """
+    if reach is None:
+        return smooth_step((vertices[:, 2] - (at[2] - 55.0)) / 50.0)
+    along, down = vertices[:, 2] - at[2], np.maximum(at[1] - vertices[:, 1], 0.0)
+    return smooth_step(1.0 - np.hypot(along, down / _PULL_DOWN) / reach)
+
+
 def _part(entry: Entry, folder: Path, load: Callable[[Path], Mesh], cage: Mesh, surface: Callable[[], Subdivision],
-          eyes: Mapping[str, Array], with_parts: Mapping[str, int], places: Array) -> Attachment:
+          eyes: Mapping[str, Array], with_parts: Mapping[str, Mapping[int, float | None]], places: Array) -> Attachment:
     """Return one part of a file and what carries it."""
     fields = entry.fields(required=("file", "part", "carried_by"), optional=("eye", "fades"))
     whole = load(folder / fields["file"].text())
@@ -266,10 +288,8 @@ def _part(entry: Entry, folder: Path, load: Callable[[Path], Mesh], cage: Mesh, 
     mesh = Mesh(whole.vertices[used], faces.reshape(-1, 3), whole.materials, whole.face_materials[keep],
                 (name,), np.zeros(len(keep), np.int32))
     carrier = fields["carried_by"].choice(CARRIERS, "carrier")
-    points: tuple = ()
-    if name in with_parts:      # a feature point of this part: its pull fades backward from it
-        row = with_parts[name]
-        points = ((row, smooth_step((mesh.vertices[:, 2] - (places[row, 2] - 55.0)) / 50.0)[:, None]),)
+    points = tuple((row, _pull(mesh.vertices, places[row], reach)[:, None])
+                   for row, reach in with_parts.get(name, {}).items())
     if carrier == "skull":
         return Attachment(mesh, points=points)
     if carrier == "jaw":

@@ -36,7 +36,8 @@ class Resolution:
     name: for a caption - the expression's name, the canonical script, or the file's stem. expression: the
     table's entry, if a name led here. units: code -> weight, intensity applied, combinations not yet; empty
     for raw data. source: where the recipe or data come from, as far as known. more: further movements, in other units
-    of length than ``deformation``, which only a face can add to it.
+    of length than ``deformation``, which only a face can add to it. optional: movements that a face without the points
+    for them leaves out, as the tongue's in speech.
     """
 
     what: object
@@ -48,6 +49,7 @@ class Resolution:
     warnings: tuple[str, ...] = ()
     source: str | None = None
     more: tuple[Deformation, ...] = ()
+    optional: tuple[Deformation, ...] = ()
 
 
 def presets() -> tuple[str, ...]:

@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+import unicodedata
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -117,12 +120,43 @@ def contact_sheet(images: Sequence[ArrayLike], labels: Sequence[str], columns: i
     return np.asarray(sheet).copy()
 
 
-def _fitted(text: str, letters: int, width: int):
-    """Return the text and a font at which it fits the width: first smaller letters, then fewer."""
+# Fonts that have the letters of the IPA, where a system has them; Pillow's own font has little more than ASCII.
+_FONTS = ("DejaVuSans.ttf", "NotoSans-Regular.ttf", "Arial.ttf", "segoeui.ttf")
+
+
+def captioned(picture: ArrayLike, text: str, height: int) -> NDArray[np.uint8]:
+    """Return a picture (h + height, w, 3) with a line of text below it on white.
+
+    Letters beyond ASCII are drawn where the system has a font with them, else without their accents or left out.
+    """
+    from PIL import Image, ImageDraw, ImageFont
+
+    pixels = over_colour(check_pixels(picture), _PAPER)
+    sheet = Image.new("RGB", (pixels.shape[1], pixels.shape[0] + height), _PAPER)
+    sheet.paste(Image.fromarray(pixels), (0, 0))
+    letters, load = round(0.62 * height), None
+    for name in _FONTS:
+        with suppress(OSError):
+            ImageFont.truetype(name, letters)
+            load = partial(ImageFont.truetype, name)
+            break
+    if load is None:
+        text = unicodedata.normalize("NFKD", text).encode("ascii", "ignore").decode()
+    text, font = _fitted(text, letters, pixels.shape[1] - height, load)
+    ImageDraw.Draw(sheet).text((height / 2, pixels.shape[0] + height / 2), text, fill=_INK, font=font, anchor="lm")
+    return np.asarray(sheet).copy()
+
+
+def _fitted(text: str, letters: int, width: int, load: Callable[[int], Any] | None = None):
+    """Return the text and a font at which it fits the width: first smaller letters, then fewer.
+
+    load: makes the font of a size; Pillow's own by default.
+    """
     from PIL import ImageFont
 
+    load = load or ImageFont.load_default
     for size in range(letters, 7, -1):
-        font = ImageFont.load_default(size)
+        font = load(size)
         if font.getlength(text) <= width:
             return text, font
     while text and font.getlength(text + "…") > width:

@@ -19,12 +19,15 @@ from numpy.typing import ArrayLike, NDArray
 
 from facegen.errors import InputError
 from facegen.fileio.images import check_pixels, over_colour
+from facegen.fileio.sound import Sound
 from facegen.fileio.textfile import check_place, whole_file
 
 _PAPER = (255, 255, 255)
 # Frames from which a GIF's one palette is made: enough to see every colour of a face, few enough to be quick.
 _PALETTE_FRAMES = 16
 _PALETTE_PIXELS = 300_000
+_SOUND_RATE = 48_000        # Opus knows no other, and every player knows it
+_SOUND_PIECE = 4096         # samples
 _BT709 = 1      # the number of the colour standard of HD video, in FFmpeg's tables
 
 
@@ -32,7 +35,7 @@ _BT709 = 1      # the number of the colour standard of HD video, in FFmpeg's tab
 class Format:
     """One kind of film. ``ticks``: durations are whole numbers of 1 / ticks s; ``fastest``: most frames a second.
 
-    even: width and height must be. clear: it keeps transparency.
+    even: width and height must be. clear: it keeps transparency. sound: the codec of its sound, if it can have one.
     """
 
     kind: str
@@ -42,13 +45,14 @@ class Format:
     fastest: float = 1000.0
     even: bool = False
     clear: bool = False
+    sound: str = ""
 
 
 # Quality: x264 18 and VP9 24 cannot be told from the frames at normal size. One thread: the same bytes on any machine.
 FORMATS = {
-    ".mp4": Format("mp4", "libx264", {"crf": "18", "preset": "fast", "threads": "1"}, even=True),
+    ".mp4": Format("mp4", "libx264", {"crf": "18", "preset": "fast", "threads": "1"}, even=True, sound="aac"),
     ".webm": Format("webm", "libvpx-vp9", {"crf": "24", "b": "0", "cpu-used": "4", "deadline": "good", "threads": "1"},
-                    even=True),
+                    even=True, sound="libopus"),
     # Browsers show frames of less than 0.02 s slower, not faster.
     ".gif": Format("GIF", ticks=100, fastest=50.0),
     ".webp": Format("WEBP", options={"quality": 88, "method": 3}, ticks=1000, clear=True),
@@ -57,12 +61,14 @@ FORMATS = {
 }
 
 
-def save_video(frames: Iterable[ArrayLike], path: str | os.PathLike[str], *, fps: float = 25.0) -> Path:
+def save_video(frames: Iterable[ArrayLike], path: str | os.PathLike[str], *, fps: float = 25.0,
+               sound: Sound | None = None) -> Path:
     """Write frames, each (h, w, 3) or (h, w, 4) uint8, as a film by the path's suffix; return the path.
 
     .mp4 (H.264) and .webm (VP9) need PyAV, ``pip install "facegen[video]"``, and even sizes. .gif, .webp, .apng and
     .png run round and round. .webp, .apng and .png keep transparency, the others get white behind. The file appears
-    whole or not at all. Frames may come one by one: MP4 and WebM hold one at a time.
+    whole or not at all. Frames may come one by one: MP4 and WebM hold one at a time. sound: begins with the first
+    frame; MP4 and WebM only.
 
     Raises InputError for the frames or fps, FileError for the path. ::
 
@@ -75,11 +81,16 @@ def save_video(frames: Iterable[ArrayLike], path: str | os.PathLike[str], *, fps
         raise InputError("frames: expected one at least, got none")
     shape = check_pixels(first).shape
     form = check_film(path, size=(shape[1], shape[0]), fps=fps)
+    if sound is not None and not form.sound:
+        raise InputError(f"sound: {path.suffix} holds no sound; take .mp4 or .webm, or leave sound out")
     if not isinstance(frames, Sequence):
         frames = itertools.chain([first], frames)
     with whole_file(path, "the film ") as draft, open(draft, "wb") as file:
-        write = _write_video if form.codec else _write_pillow
-        write(file, form, frames, Fraction(fps).limit_denominator(10_000), shape)
+        rate = Fraction(fps).limit_denominator(10_000)
+        if form.codec:
+            _write_video(file, form, frames, rate, shape, sound)
+        else:
+            _write_pillow(file, form, frames, rate, shape)
     return path
 
 
@@ -120,7 +131,8 @@ def _checked(frames: Iterable[ArrayLike], shape: tuple[int, ...], clear: bool) -
 
 
 # -- PyAV -------------------------------------------------------------------------------------------------------
-def _write_video(file: Any, form: Format, frames: Iterable[ArrayLike], fps: Fraction, shape: tuple[int, ...]) -> None:
+def _write_video(file: Any, form: Format, frames: Iterable[ArrayLike], fps: Fraction, shape: tuple[int, ...],
+                 sound: Sound | None) -> None:
     av, out = _av(), _Watched(file)
     try:
         # "bitexact": no random numbers and no version in the file, so that the same frames make the same bytes
@@ -131,14 +143,29 @@ def _write_video(file: Any, form: Format, frames: Iterable[ArrayLike], fps: Frac
             context = stream.codec_context
             context.colorspace = context.color_primaries = context.color_trc = _BT709
             context.color_range = 1     # 16..235, which every player expects
+            if sound is not None:       # all streams before the first packet
+                voice = container.add_stream(form.sound, rate=_SOUND_RATE, layout="mono")
             for k, pixels in enumerate(_checked(frames, shape, clear=False)):
                 frame = av.VideoFrame.from_ndarray(np.ascontiguousarray(pixels), format="rgb24")
                 frame = frame.reformat(format="yuv420p", dst_colorspace="ITU709", dst_color_range="MPEG")
                 frame.pts, frame.time_base = k, 1 / fps
                 container.mux(stream.encode(frame))
             container.mux(stream.encode())
+            if sound is not None:
+                for frame in _sound_frames(av, sound):
+                    container.mux(voice.encode(frame))
+                container.mux(voice.encode())
     except av.FFmpegError as error:
         raise out.error or OSError(str(error)) from error
+
+
+def _sound_frames(av: Any, sound: Sound) -> Iterator[Any]:
+    """Yield a sound in pieces; the encoder brings them to its own rate and form."""
+    for start in range(0, len(sound.samples), _SOUND_PIECE):
+        piece = np.ascontiguousarray(sound.samples[None, start: start + _SOUND_PIECE])
+        frame = av.AudioFrame.from_ndarray(piece, format="s16", layout="mono")
+        frame.sample_rate, frame.pts, frame.time_base = sound.rate, start, Fraction(1, sound.rate)
+        yield frame
 
 
 class _Watched:

@@ -35,6 +35,7 @@ from facegen.facs.expressions import Resolution, resolve
 from facegen.facs.yamlfile import read_data
 from facegen.fileio.avatar import ANIMATED
 from facegen.fileio.images import without_full_alpha, write_whole
+from facegen.fileio.sound import Sound
 from facegen.fileio.textfile import make_folder, save_text
 from facegen.fileio.video import FORMATS, check_film, save_video
 from facegen.geometry.camera import Camera, check_view, frame
@@ -137,7 +138,8 @@ def save_clip(clip: Motion | Performance, path: str | os.PathLike[str], *, fps: 
     head = portrait(rig, mesh.vertices)
     camera = frame(head, _reach(rig, clip, frame(head, size=size, view=view)), size=size, view=view)
     shot = Shot(clip.shown, float(fps), count, name, level, background, chosen, (camera,))
-    return target.fill(shot, [clip.cue(frame_time(k, fps)) for k in range(count)], workers, step)
+    cues = [clip.cue(frame_time(k, fps)) for k in range(count)]
+    return target.fill(shot, cues, workers, step, sound=getattr(clip, "sound", None))
 
 
 def as_motion(clip: Motion | Performance) -> Motion:
@@ -241,8 +243,12 @@ class _Target:
             raise FileError(f"{path}: holds frames that facegen did not make here; choose another folder or remove "
                             "them")
 
-    def fill(self, shot: Shot, cues: Sequence[Any], workers: int, step: Callable[[], None] | None) -> Report:
-        """Draw what is missing and put the film together. cues: of every frame."""
+    def fill(self, shot: Shot, cues: Sequence[Any], workers: int, step: Callable[[], None] | None, *,
+             sound: Sound | None = None) -> Report:
+        """Draw what is missing and put the film together, with a sound if its kind can have one.
+
+        cues: of every frame.
+        """
         self._open(shot)
         paths = [self.folder / f"frame_{k:05d}.png" for k in range(1, shot.frames + 1)]
         tasks = [FrameTask(shot, k, cue, path, shot.fingerprint)
@@ -251,7 +257,8 @@ class _Target:
             warm(shot.renderer, coloured=load_face(shot.face).mesh(shot.detail).colours is not None)
         report = run(tasks, workers=workers, step=step)
         if self.is_film:
-            save_video(_Frames(paths), self.path, fps=self.fps)
+            heard = sound if FORMATS[self.path.suffix.lower()].sound else None
+            save_video(_Frames(paths), self.path, fps=self.fps, sound=heard)
             shutil.rmtree(self.folder, ignore_errors=True)
         return report
 

@@ -60,6 +60,7 @@ MATERIALS: Mapping[str, Material] = MappingProxyType({
     "gums": Material(COLOURS["gums"], 0.12, 40.0, _WET_WRAP, lift=0.3),
     "tongue": Material(COLOURS["tongue"], 0.10, 30.0, _WET_WRAP, lift=0.12),
     "mouth": Material(COLOURS["mouth"], 0.05, 30.0, lift=0.5),
+    "flesh": Material((222, 158, 140), 0.0, 10.0, (0.3, 0.3, 0.3)),      # the cut of facegen.geometry.section
 })
 
 # A material name that the scene does not know is drawn in plain clay.

@@ -469,6 +469,8 @@ def write(names, vertices, faces, materials, creases, corners) -> None:
                                  **({"jaw": jaw} if jaw else {}), **({"paper": number} if number else {})}
             place[full_name] = vertices[at[side(where, s)]]
     points["tongue_tip"] = {"at": [0.0, -69.9, 10.6], "part": "tongue", "role": "input", "scale": "mouth"}
+    points["tongue_body"] = {"at": [0.0, -63.5, -14.0], "part": "tongue", "role": "input", "scale": "mouth", "reach": 34}
+    points["tongue_back"] = {"at": [0.0, -62.1, -38.0], "part": "tongue", "role": "input", "scale": "mouth", "reach": 34}
     points = dict(sorted(points.items(), key=lambda kv: (kv[0][-2:] in ("_L", "_R"), kv[0][-2:] == "_R")))
 
     left = [n for n in points if not n.endswith("_R") and n in place]

@@ -165,7 +165,7 @@ def _other(name: str) -> str:
 def _fixed(face: Face):
     import cage_design
     fixed = {n for n, (_, role, *_r) in cage_design.FEATURE_POINTS.items() if role == "fixed"}
-    return fixed | {_other(n) for n in fixed} | {"tongue_tip"}
+    return fixed | {_other(n) for n in fixed} | {"tongue_tip", "tongue_body", "tongue_back"}
 
 
 def _sheets(face: Face):

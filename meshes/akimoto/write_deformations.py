@@ -206,13 +206,13 @@ class Maker:
             pairs += [(_other(n), v * [-1, 1, 1]) for n, v in pairs if n.endswith("_L")]
         out = np.zeros((len(self.names), 3))
         total = np.zeros(len(self.names))
-        fixed = set(range(len(self.names))) - set(self.s.free.tolist()) - {self.at["tongue_tip"]}
+        fixed = set(range(len(self.names))) - set(self.s.free.tolist()) - {self.at[n] for n in self.names if n.startswith("tongue_")}
         for n, v in pairs:
             i = self.at[n]
             w = np.exp(-(np.linalg.norm(self.places - self.places[i], axis=1) / reach) ** 2)
             mine = lip_side(n, self.places[i])
             same = np.array([1 - abs(lip_side(m, p) - mine) for m, p in zip(self.names, self.places, strict=True)])
-            w = w * same * np.array([m != "tongue_tip" for m in self.names])
+            w = w * same * np.array([not m.startswith("tongue_") for m in self.names])
             out += w[:, None] * v
             total += w
         out /= np.maximum(total, 0.35)[:, None]

@@ -220,6 +220,8 @@ WRONG = [
     ("points.chin.paper", 4, "points.chin.paper: expected a text"),
     ("points.chin.paper", "F3", "points.chin.paper: 'F3' is given to two feature points"),
     ("points.chin.part", "tongue", "points.tongue_tip.part: 'tongue' is given to two feature points"),
+    ("points.chin.reach", 20, "points.chin.reach: only the pull on a part has a reach; give part"),
+    ("points.tongue_tip.reach", 0, "points.tongue_tip.reach: expected a number"),
     ("points.tongue_tip.part", "tonge", "tongue_tip.part: unknown part 'tonge'; did you mean 'tongue'"),
     ("regions", [], "regions: expected one region or more"),
     ("regions", {}, "regions: expected a list"),

@@ -91,7 +91,8 @@ def test_child_and_adult_share_the_table(face, tmp_path):
     data["jaw"] |= {"hinge": twice(data["jaw"]["hinge"]), "glide": twice(data["jaw"]["glide"])}
     data["eyes"] = {k: twice(v) for k, v in data["eyes"].items()}
     data["head"] = {k: twice(v) for k, v in data["head"].items()}
-    del data["points"]["tongue_tip"]
+    for name in ("tongue_tip", "tongue_body", "tongue_back"):
+        del data["points"][name]
     (folder / "face.yaml").write_text(yaml.safe_dump(data))
     lines = (folder / "cage.obj").read_text().splitlines()
     (folder / "cage.obj").write_text("\n".join(

@@ -5,6 +5,7 @@ import pytest
 from PIL import Image
 
 from facegen.errors import FileError, InputError
+from facegen.fileio import images
 from facegen.fileio.images import check_image_path, contact_sheet, save_image
 
 RNG = np.random.default_rng(5)
@@ -102,3 +103,17 @@ def test_a_contact_sheet_refuses_what_does_not_fit_together():
         contact_sheet([picture], ["a"], 0)
     with pytest.raises(InputError, match=r"^images: expected one height"):
         contact_sheet([picture, picture[:10]], ["a", "b"])
+
+
+@pytest.mark.parametrize("fonts", [images._FONTS, ("no such font.ttf",)])
+def test_a_line_below_a_picture(monkeypatch, fonts):
+    """With a font that has the letters of the IPA and with Pillow's own, which has none of them."""
+    monkeypatch.setattr(images, "_FONTS", fonts)
+    picture = np.full((40, 300, 3), 90, np.uint8)
+    made = images.captioned(picture, "θ  TH  wie in thin, été", 20)
+    assert made.shape == (60, 300, 3)
+    assert np.array_equal(made[:40], picture)
+    assert (made[40:] < 100).any()                          # ink
+    assert (made[40:, -15:] == 255).all()                   # and room after it
+    long = images.captioned(picture, "word " * 60, 20)
+    assert (long[40:, -8:] == 255).all()
