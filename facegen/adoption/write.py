@@ -44,6 +44,8 @@ def _flow(value: Any) -> str:
 def check_folder(path: str | os.PathLike[str], *, force: bool) -> Path:
     """Return a folder that a face may be written to; FileError if something else is there: ask before long work."""
     path = Path(path)
+    if path.name in ("", ".."):
+        raise FileError(f"{path}: expected the name of a folder for the face, such as me/")
     if path.suffix.lower() in (".obj", ".glb", ".gltf", ".vrm", ".yaml", ".yml", ".npz"):
         raise FileError(f"{path}: expected the name of a folder, such as {path.stem}/, got one that ends in "
                         f"{path.suffix}")
@@ -65,7 +67,7 @@ def save_folder(path: Path, files: Mapping[str, str]) -> Path:
 
     Raises FileError; what was there is then still there.
     """
-    with _whole_folder(path) as draft:
+    with _whole_folder(path.resolve()) as draft:
         for name, text in files.items():
             (draft / name).write_text(text, encoding="utf-8", newline="\n")
     return path

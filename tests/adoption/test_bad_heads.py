@@ -8,9 +8,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from facegen.adoption.adopt import adopt
+from facegen.adoption.adopt import adopt, doubts
 from facegen.adoption.base import base_face
 from facegen.adoption.checks import check_head
+from facegen.adoption.residual import Residual
 from facegen.adoption.write import save_folder
 from facegen.data import meshes_dir
 from facegen.errors import FileError, InputError, TableError
@@ -74,6 +75,12 @@ def test_closed_eyes(refused, tmp_path, marks):
         check_head(SimpleNamespace(points=shut), base_face())
 
 
+def test_a_face_far_from_its_head_is_told():
+    assert not doubts(Residual(0.1, 0.5, 2.0, 0.95))
+    assert "20 in 100" in doubts(Residual(0.1, 0.5, 2.0, 0.8))[0]
+    assert "7.0 mm" in doubts(Residual(0.1, 0.5, 7.0, 0.95))[0]
+
+
 def test_a_mesh_with_nan(refused, tmp_path):
     lines = (HUMAN / "human.obj").read_text().splitlines()
     row = next(i for i, line in enumerate(lines) if line.startswith("v "))
@@ -84,7 +91,8 @@ def test_a_mesh_with_nan(refused, tmp_path):
 
 
 @pytest.mark.parametrize(("place", "words"), [
-    ("face.obj", "expected the name of a folder"), ("nosuch/face", "does not exist; make it first"),
+    ("face.obj", "expected the name of a folder"), ("..", "expected the name of a folder"),
+    ("nosuch/face", "does not exist; make it first"),
     ("file", "is a file"), ("full", "holds other files"), ("taken", "--force")])
 def test_places_that_a_face_cannot_go_to(tmp_path, place, words):
     (tmp_path / "file").write_text("x")
