@@ -19,7 +19,6 @@ from facegen.adoption.residual import Residual, residual_of
 from facegen.adoption.shape import shape_of
 from facegen.adoption.space import space_between
 from facegen.adoption.write import check_folder, save_folder, yaml_text
-from facegen.errors import FileError
 from facegen.facs.yamlfile import read_data
 from facegen.fileio.avatar import AvatarFile, load_avatar
 from facegen.fileio.obj import format_obj
@@ -29,6 +28,10 @@ from facegen.transfer.alignment import Similarity, align
 from facegen.transfer.apart import Apart, take_apart
 from facegen.transfer.landmarks import Landmarks, check_places, load_landmarks
 from facegen.transfer.pieces import describe
+from facegen.transfer.rig import avatar_files
+
+# Of a face's places those that a whole head is near to, and how far (mm) the farthest may be before one should look.
+_REACHED, _FAR = 0.9, 5.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,12 +60,14 @@ class Made:
     eye_size: float
 
 
-def adopt(head: str | Path, output: str | os.PathLike[str], *, landmarks: str | Path, name: str | None = None,
-          hair: bool = False, pieces: Mapping[str, str] | None = None, force: bool = False) -> Adopted:
+def adopt(head: str | Path, output: str | os.PathLike[str], *, landmarks: str | Path | None = None,
+          name: str | None = None, hair: bool = False, pieces: Mapping[str, str] | None = None, force: bool = False
+          ) -> Adopted:
     """Make a parametric face out of a human head's mesh and write its folder.
 
-    head: the path of a .obj, .glb, .gltf, .vrm, .ply or .stl file. output: a folder, new or empty; with ``force`` one
-    that holds a face is replaced. landmarks: their file (docs/landmarks.md). name: the face's; the folder's without.
+    head: the path of a .obj, .glb, .gltf, .vrm, .ply or .stl file, or the name of a shipped avatar. output: a folder,
+    new or empty; with ``force`` one that holds a face is replaced. landmarks: their file (docs/landmarks.md); a shipped
+    avatar has its own. name: the face's; the folder's without.
     hair: give a head without hair the base face's. pieces: part, material or number of a component -> kind, as in
     `rig`. Raises InputError and its children; nothing is written then. ::
 
@@ -70,11 +75,9 @@ def adopt(head: str | Path, output: str | os.PathLike[str], *, landmarks: str | 
         facegen.load_face("me").pose("happiness")
     """
     folder = check_folder(output, force=force)
-    path = Path(head)
-    if not path.exists():
-        raise FileError(f"head: expected a mesh file, got {str(head)!r}, which does not exist")
+    path, marked = avatar_files(head, landmarks, what="head")
     source = load_avatar(path)
-    marks = load_landmarks(landmarks, source.mesh, mesh_name=path.name, digest=source.digest)
+    marks = load_landmarks(marked, source.mesh, mesh_name=path.name, digest=source.digest)
     made = make_face(source, marks, name=name or folder.resolve().name, hair=hair, pieces=pieces,
                      origin=f"made of {path.name} by facegen adopt")
     save_folder(folder, made.files)
@@ -95,7 +98,7 @@ def make_face(source: AvatarFile, landmarks: Landmarks, *, name: str, origin: st
     space = space_between(base.cage.vertices, shape.cage)
     eyes = eyes_of(base, shape, space)
     parts, bite = parts_of(base, shape, space, eyes)
-    own, notes = own_parts(mesh, apart)
+    own = own_parts(mesh, apart, {"skin", *parts})
     entries = [entry for entry in base.data["parts"]
                if entry["part"] not in own and (entry["part"] != "hair" or hair)]
     kept = {entry["part"]: parts[entry["part"]] for entry in entries} | own
@@ -119,4 +122,14 @@ def make_face(source: AvatarFile, landmarks: Landmarks, *, name: str, origin: st
              "landmarks.yaml": yaml_text("Landmarks; docs/landmarks.md lists the names.",
                                          {"source": origin, "mesh": "cage.obj", "landmarks": marks})}
     residual = residual_of(Surface(shape.surface, base.surface.faces), base, apart.surface, shape.partners)
-    return Made(files, frame, residual, apart, (*warnings, *apart.skin.notes, *notes), eyes.size)
+    return Made(files, frame, residual, apart, (*warnings, *apart.skin.notes, *doubts(residual)),
+                eyes.size)
+
+
+def doubts(residual: Residual) -> list[str]:
+    """Return what is to be said of a face that does not come near its head."""
+    if residual.reached >= _REACHED and residual.largest <= _FAR:
+        return []
+    return [f"the face does not follow the head everywhere: {100 * (1 - residual.reached):.0f} in 100 of its places "
+            f"have none of the head near, the farthest of the others is {residual.largest:.1f} mm away; look at it "
+            "(--preview), at the landmarks, and whether the skin has holes"]

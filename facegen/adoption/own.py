@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Container, Sequence
 
 import numpy as np
 
@@ -15,16 +15,18 @@ _WORDS = {"brow": "brows", "brows": "brows", "eyebrow": "brows", "eyebrows": "br
 _RIDING = ("carried", "skull")
 
 
-def own_parts(mesh: Mesh, apart: Apart) -> tuple[dict[str, Mesh], tuple[str, ...]]:
-    """Return name -> mesh of what rides on the person's skin, in the working frame, and notes on what is left out."""
+def own_parts(mesh: Mesh, apart: Apart, taken: Container[str]) -> dict[str, Mesh]:
+    """Return name -> mesh of what rides on the person's skin, in the working frame. taken: names of other parts."""
     named: dict[str, list[Piece]] = {}
     for piece in apart.pieces:
         if piece.kind in _RIDING:
             words = words_of(piece.name.split("|")[0]) | words_of(piece.name)
-            name = next((part for word, part in _WORDS.items() if word in words), piece.name.split("|")[0] or "worn")
-            named.setdefault(name.replace(" ", "_"), []).append(piece)
-    result = {name: _mesh(name, pieces, mesh, apart) for name, pieces in named.items()}
-    return result, ()
+            name = next((part for word, part in _WORDS.items() if word in words), "")
+            if not name:
+                name = "_".join(piece.name.split("|")[0].split()) or "worn"
+                name = f"{name}_own" if name in taken else name
+            named.setdefault(name, []).append(piece)
+    return {name: _mesh(name, pieces, mesh, apart) for name, pieces in named.items()}
 
 
 def _mesh(name: str, pieces: Sequence[Piece], mesh: Mesh, apart: Apart) -> Mesh:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from facegen.adoption.base import Base
 from facegen.adoption.shape import Shape
 from facegen.adoption.space import Space, heights, similarity_between
+from facegen.geometry.ahead import ahead
 from facegen.geometry.mesh import Mesh
 from facegen.geometry.operators import Surface
 from facegen.transfer.alignment import Similarity
@@ -25,11 +26,10 @@ _LEAST_EYE, _MOST_EYE = 0.6, 1.6
 # How firmly an eye's centre keeps to where the space takes it, beside ten vertices of the lids' margins.
 _KEEP = 0.3
 _ROUNDS = 20
-# Millimetres: teeth are not drawn back farther than this, nor is what lies this far from the lips looked at.
-_DRAWN_BACK, _NEAR = 8.0, 12.0
-# Of the base face's clearance behind the lips, what a person's thinner lips still need; and how far back, in mm, teeth
-# are in front.
-_CLEAR, _FRONT = 0.6, 15.0
+# Millimetres: teeth are not drawn back farther than this; those this far behind the foremost are in front.
+_DRAWN_BACK, _FRONT = 8.0, 15.0
+# Of the way from the base face's teeth to the outside of its lips, what a person with thinner lips still needs.
+_CLEAR = 0.6
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,9 +94,10 @@ def _bite(base: Base, shape: Shape, space: Space, meshes: Mapping[str, Mesh]) ->
     at = np.concatenate([meshes[name].vertices for name in TEETH if name in meshes])
     found = similarity_between(at, space(at))
     teeth = np.concatenate([meshes[name].vertices for name in TEETH[:2] if name in meshes])
-    before = -heights(teeth, base.surface)[0]
-    front = np.flatnonzero((before > 0) & (before < _NEAR) & (teeth[:, 2] > teeth[:, 2].max() - _FRONT))
-    after = -heights(found.apply(teeth[front]), Surface(shape.surface, base.surface.faces))[0]
-    short = float((_CLEAR * before[front] - after).max(initial=0.0))
-    back = np.array([0.0, 0.0, -min(max(short, 0.0), _DRAWN_BACK)])
+    front = teeth[teeth[:, 2] > teeth[:, 2].max() - _FRONT]
+    before, _ = ahead(front, base.surface.corners)
+    after, _ = ahead(found.apply(front), shape.surface[base.surface.faces])
+    over = np.isfinite(before) & np.isfinite(after)         # places that lips cover
+    short = float((_CLEAR * before - after)[over].max(initial=0.0))
+    back = np.array([0.0, 0.0, -min(short, _DRAWN_BACK)])
     return Similarity(found.scale, found.rotation, found.offset + back)

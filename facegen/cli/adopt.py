@@ -10,12 +10,12 @@ import typer
 from facegen.cli.options import Json, Quiet, print_json, read_pieces, warn
 from facegen.errors import InputError
 
-Head = Annotated[Path, typer.Argument(
-    metavar="HEAD", help="The mesh of a human head: .obj, .glb, .gltf, .vrm, .ply or .stl.")]
+Head = Annotated[str, typer.Argument(
+    metavar="HEAD", help="A human head: a .obj, .glb, .gltf, .vrm, .ply or .stl file, or a shipped avatar's name.")]
 Out = Annotated[Path | None, typer.Option(
     "--output", "-o", metavar="FOLDER", help="Where the face goes: a folder, new or empty. [required]")]
 Marks = Annotated[Path | None, typer.Option(
-    "--landmarks", "-l", metavar="FILE", help="The head's landmarks, a YAML file. [required]")]
+    "--landmarks", "-l", metavar="FILE", help="The head's landmarks; a shipped avatar has its own.")]
 Name = Annotated[str | None, typer.Option("--name", metavar="NAME", help="The face's name. [default: the folder's]")]
 Hair = Annotated[bool, typer.Option("--hair", help="Give a head without hair the base face's.")]
 Pieces = Annotated[list[str] | None, typer.Option(
@@ -34,10 +34,7 @@ def adopt(head: Head, output: Out = None, landmarks: Marks = None, name: Name = 
     Then: facegen render happiness --face me -o happy.png
     """
     if output is None:
-        raise InputError(f"-o: say which folder the face goes to, for example -o {head.stem}")
-    if landmarks is None:
-        raise InputError(f"--landmarks: expected the file of the head's landmarks, got none; write one with "
-                         f"the places of eyes, brows, nose, mouth and chin on {head.name} (docs/landmarks.md lists the names)")
+        raise InputError(f"-o: say which folder the face goes to, for example -o {Path(head).stem}")
     from facegen.jobs.adopting import adopt as make
 
     made = make(head, output, landmarks=landmarks, name=name, hair=hair, pieces=read_pieces(piece), force=force,
@@ -47,7 +44,8 @@ def adopt(head: Head, output: Out = None, landmarks: Marks = None, name: Name = 
     if json:
         print_json({"folder": str(made.path), "residual_mm": made.residual.as_dict(),
                     "eye_size": round(made.eye_size, 4), "millimetres_a_unit": made.frame.scale,
-                    "warnings": list(made.warnings), "preview": None if preview is None else str(preview), "pieces": list(made.pieces)})
+                    "warnings": list(made.warnings), "preview": None if preview is None else str(preview),
+                    "pieces": list(made.pieces)})
     elif not quiet:
         for row in made.pieces:
             print(f"{row['name']}: {row['kind']}, {row['triangles']} triangles ({row['why']})")

@@ -69,16 +69,20 @@ def shapes(name: ShapeSet = "arkit", person: PersonName = None, json: Json = Fal
 
 @app.command()
 def faces(json: Json = False) -> None:
-    """Faces that can be drawn: name, number of feature points and regions."""
-    from facegen.face.face import face_names
+    """Faces that can be drawn: name, number of feature points and regions; and heads that a package offers."""
+    from facegen.face.face import face_names, offered_names
     from facegen.face.face import load_face as load
 
     rows = []
     for name in face_names():
         face = load(name)
         rows.append({"name": name, "feature_points": len(face.feature_points), "regions": len(face.regions)})
-    _show(rows, [(row["name"], f"{row['feature_points']} feature points, {row['regions']} regions")
-                 for row in rows], json)
+    lines = [(row["name"], f"{row['feature_points']} feature points, {row['regions']} regions") for row in rows]
+    for name in offered_names():                # made when first asked for: not for a list
+        package = name.partition(":")[0]
+        rows.append({"name": name, "package": package})
+        lines.append((name, f"a head of the package {package}"))
+    _show(rows, lines, json)
 
 
 @app.command()

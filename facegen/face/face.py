@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache, cached_property, lru_cache
 from importlib import import_module
+from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -437,6 +438,12 @@ def _shipped() -> Mapping[str, Path]:
 def face_names() -> tuple[str, ...]:
     """Return the names of the shipped faces."""
     return tuple(_shipped())
+
+
+def offered_names() -> tuple[str, ...]:
+    """Return the names of faces that installed packages offer, such as "anny:child"; others go by more words."""
+    return tuple(name for package, module in OFFERED.items() if find_spec(package)
+                 for name in import_module(module).head_names())
 
 
 def is_face_name(face: str | Path) -> bool:

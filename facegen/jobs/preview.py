@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from facegen.errors import InputError
 from facegen.face.avatar import AvatarFace
 from facegen.face.face import Face
+from facegen.face.loader import FINEST
 from facegen.face.rig import Rig
 from facegen.fileio.images import check_image_path, contact_sheet, save_image
 from facegen.render.render import Renderer
@@ -24,6 +25,8 @@ VIEWS = ((0.0, 0.0), (35.0, 0.0))
 POSES, ROW = 20, 4      # on a sheet, with the neutral; in a row of it
 # Because so many vertices, evenly taken, say which shapes are unlike each other.
 _SPEAKERS = 4000
+# The finest level of a parametric face: a person's wrinkles are what one looks for.
+_DETAIL = FINEST
 # Because a shape of which no more than this share is new, squared, shows nothing new.
 _SAID = 0.01
 
@@ -40,16 +43,18 @@ def save_preview(face: AvatarFace, path: str | os.PathLike[str], *, size: int = 
 
 def save_face_preview(face: Face, path: str | os.PathLike[str], *, size: int = 192) -> Path:
     """Draw a parametric face, its neutral and expressions, each from two views; return the path. As `save_preview`."""
-    return save_poses(face, {"neutral": face.pose(), **{label: face.pose(what) for label, what in EXPRESSIONS.items()}},
-                      path, size=size)
+    poses = {"neutral": face.pose(detail=_DETAIL)}
+    poses |= {label: face.pose(what, detail=_DETAIL) for label, what in EXPRESSIONS.items()}
+    return save_poses(face, poses, path, size=size, detail=_DETAIL)
 
 
-def save_poses(face: Rig, poses: Mapping[str, NDArray], path: str | os.PathLike[str], *, size: int = 192) -> Path:
+def save_poses(face: Rig, poses: Mapping[str, NDArray], path: str | os.PathLike[str], *, size: int = 192,
+               detail: int | None = None) -> Path:
     """Draw poses, label -> vertices (n, 3), each from two views, as one sheet; return the path."""
     path = check_image_path(path)
     around = np.concatenate(list(poses.values()))
     drawn = [[renderer.draw(vertices) for vertices in poses.values()]
-             for renderer in (Renderer(face, size=size, view=view, around=around) for view in VIEWS)]
+             for renderer in (Renderer(face, size=size, view=view, around=around, detail=detail) for view in VIEWS)]
     labels = [f"{name} {view[0]:g},{view[1]:g}" if any(view) else name for name in poses for view in VIEWS]
     pictures = [picture for both in zip(*drawn, strict=True) for picture in both]
     return save_image(contact_sheet(pictures, labels, ROW * len(VIEWS)), path)

@@ -54,6 +54,22 @@ def avatar_names() -> tuple[str, ...]:
     return tuple(_shipped())
 
 
+def avatar_files(avatar: str | Path, landmarks: str | Path | None, *, what: str = "avatar") -> tuple[Path, Path]:
+    """Return the file of an avatar, given by path or a shipped one by name, and that of its landmarks. ``what`` it is
+    called in errors. Raises InputError or FileError."""
+    path = _shipped().get(str(avatar), Path(avatar))
+    if not path.exists():
+        named = f", or one of {', '.join(_shipped())}" if path.suffix == "" else ""
+        raise FileError(f"{what}: expected a file{named}, got {str(avatar)!r}, which does not exist"
+                        f"{nearest(str(avatar), _shipped())}")
+    marks = Path(landmarks) if landmarks is not None else path.with_name("landmarks.yaml") \
+        if str(avatar) in _shipped() else None
+    if marks is None:
+        raise InputError(f"landmarks: expected the file of the {what}'s landmarks, got none; write one with the places "
+                         f"of eyes, brows, nose, mouth and chin on {path.name} (docs/landmarks.md lists the names)")
+    return path, marks
+
+
 def rig(avatar: str | Path, output: str | Path, *, landmarks: str | Path | None = None,
         sets: Sequence[str] | None = None, shapes: Sequence[str] | None = None, person: str | Path | None = None,
         template: str | Path | None = None, template_landmarks: str | Path | None = None, method: str = "landmarks",
@@ -73,16 +89,7 @@ def rig(avatar: str | Path, output: str | Path, *, landmarks: str | Path | None 
         facegen.rig("cat.obj", "cat.glb", landmarks="cat.yaml")
         facegen.load_face("cat.glb").pose("happiness")
     """
-    path = _shipped().get(str(avatar), Path(avatar))
-    if not path.exists():
-        named = f", or one of {', '.join(_shipped())}" if path.suffix == "" else ""
-        raise FileError(f"avatar: expected a file{named}, got {str(avatar)!r}, which does not exist"
-                        f"{nearest(str(avatar), _shipped())}")
-    marks = Path(landmarks) if landmarks is not None else path.with_name("landmarks.yaml") \
-        if str(avatar) in _shipped() else None
-    if marks is None:
-        raise InputError(f"landmarks: expected the file of the avatar's landmarks, got none; write one with the places "
-                         f"of eyes, brows, nose, mouth and chin on {path.name} (docs/landmarks.md lists the names)")
+    path, marks = avatar_files(avatar, landmarks)
     asked = _asked(sets, shapes, person, template, template_landmarks)
     chosen = read_weights(weights)
     source = load_avatar(path)
