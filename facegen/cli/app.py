@@ -11,7 +11,7 @@ from typing import Annotated
 import typer
 
 from facegen import __version__
-from facegen.cli import batch, explain, figures, film, gallery, listing, picture
+from facegen.cli import batch, explain, figures, film, gallery, listing, picture, stream
 from facegen.cli import rig as rigging
 from facegen.errors import FacegenError, InputError
 
@@ -33,6 +33,8 @@ app.command("animate")(film.animate)
 app.command("morph")(film.morph)
 app.command("turntable")(film.turntable)
 app.command("rig")(rigging.rig)
+app.command("encode")(stream.encode)
+app.command("decode")(stream.decode)
 
 
 def _version(asked: bool) -> None:
