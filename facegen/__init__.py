@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from facegen.animation.clip import Clip
     from facegen.animation.performance import Performance
     from facegen.animation.script import load_clip, morph
+    from facegen.animation.streams.files import load_performance, save_performance
     from facegen.blendshapes.recipes import Recipe, shape_set
     from facegen.errors import FacegenError, FileError, InputError, JobError, NotationError, TableError
     from facegen.face.avatar import AvatarFace
@@ -72,6 +73,7 @@ __all__ = [
     "load_deformation",
     "load_expressions",
     "load_face",
+    "load_performance",
     "load_person",
     "load_units",
     "morph",
@@ -87,6 +89,7 @@ __all__ = [
     "save_clip",
     "save_image",
     "save_passes",
+    "save_performance",
     "save_turn",
     "save_video",
     "shape_set",
@@ -97,6 +100,7 @@ _HOMES = {
     "facegen.animation.clip": ("Clip",),
     "facegen.animation.performance": ("Performance",),
     "facegen.animation.script": ("load_clip", "morph"),
+    "facegen.animation.streams.files": ("load_performance", "save_performance"),
     "facegen.blendshapes.recipes": ("Recipe", "shape_set"),
     "facegen.errors": ("FacegenError", "FileError", "InputError", "JobError", "NotationError", "TableError"),
     "facegen.face.avatar": ("AvatarFace",),

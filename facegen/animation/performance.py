@@ -27,7 +27,8 @@ class Performance:
     """A recording of n frames.
 
     times: (n,) seconds, ascending. names: (k,) shapes, each once; weights: (n, k), mostly 0..1, NaN where there is
-    none, such as in a frame where no face was found. vocabulary: one of `VOCABULARIES`.
+    none, such as in a frame where no face was found. vocabulary: one of `VOCABULARIES`; of "units" the names are codes,
+    "12" or "L12".
     head: (n, 3) degrees of yaw (to the subject's left), pitch (up) and roll (to the subject's left shoulder); place:
     (n, 3) millimetres of the head in the recorder's frame, +x to the subject's left, +y up, +z forward; gaze: (n, 4)
     degrees of yaw_L, pitch_L, yaw_R, pitch_R in the head. Each may be None or hold NaN.

@@ -11,8 +11,9 @@ from typing import Annotated
 import typer
 
 from facegen import __version__
-from facegen.cli import batch, explain, figures, film, gallery, listing, picture, stream
+from facegen.cli import batch, convert, explain, figures, film, gallery, listing, picture
 from facegen.cli import rig as rigging
+from facegen.cli import stream as streaming
 from facegen.errors import FacegenError, InputError
 
 DONE, STOPPED, WRONG = 0, 1, 2
@@ -33,8 +34,9 @@ app.command("animate")(film.animate)
 app.command("morph")(film.morph)
 app.command("turntable")(film.turntable)
 app.command("rig")(rigging.rig)
-app.command("encode")(stream.encode)
-app.command("decode")(stream.decode)
+app.command("convert")(convert.convert)
+app.command("encode")(streaming.encode)
+app.command("decode")(streaming.decode)
 
 
 def _version(asked: bool) -> None:

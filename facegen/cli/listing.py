@@ -82,6 +82,17 @@ def faces(json: Json = False) -> None:
 
 
 @app.command()
+def formats(json: Json = False) -> None:
+    """Formats of recordings: name, what it is, whether it can be read and written."""
+    from facegen.animation.streams import FORMATS
+
+    rows = [{"name": one.name, "about": one.about, "suffixes": list(one.suffixes), "reads": one.read is not None,
+             "writes": one.write is not None, "vocabulary": one.vocabulary} for one in FORMATS.values()]
+    does = {(True, True): "reads, writes", (True, False): "reads", (False, True): "writes"}
+    _show(rows, [(row["name"], does[row["reads"], row["writes"]], row["about"]) for row in rows], json)
+
+
+@app.command()
 def people(json: Json = False) -> None:
     """People with habits of their own: name and what they are like."""
     from facegen.facs.expression_table import load_person

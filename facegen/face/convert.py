@@ -74,14 +74,14 @@ def convert(weights: Mapping[str, float], source: str, target: str, *, person: s
         found = load_units().coefficients(parse_weights(weights))
         head = tuple(member for member in found if is_head(member))
         members = {member: value for member, value in found.items() if member not in head}
-        raw = np.zeros(_space().size)
+        raw = np.zeros(movement_space().size)
     else:
-        shapes = _target(source, None) if person is None else Shapes(shape_set(source, person))
+        shapes = of_set(source) if person is None else Shapes(shape_set(source, person))
         members, raw = shapes.split(checked(weights, shapes.recipes, source))
     if target == "units":
         made, residual = _as_units(members, raw)
         return Conversion(made | ({code: weights_of(found[code]) for code in head} if head else {}), residual)
-    shapes = _target(target, None) if person is None else Shapes(shape_set(target, person))
+    shapes = of_set(target) if person is None else Shapes(shape_set(target, person))
     return Conversion(*shapes.fitted(members, raw), head)
 
 
@@ -112,14 +112,14 @@ class Shapes:
     def __init__(self, recipes: Mapping[str, Recipe]) -> None:
         self.recipes = recipes
         # Shapes that are units at full weight, those of more units first: blink before blinkLeft.
-        self._direct = sorted((name for name, one in recipes.items()
+        self.direct = sorted((name for name, one in recipes.items()
                                if one.members and all(value == 1.0 for value in one.members.values())),
                               key=lambda name: -len(recipes[name].members))
 
     def split(self, weights: Mapping[str, float]) -> tuple[dict[str, float], NDArray[np.float64]]:
         """Return what a sum of these shapes is: members of the unit table, and the rest as movement (d,)."""
         members: dict[str, list[float]] = {}
-        raw = np.zeros(_space().size)
+        raw = np.zeros(movement_space().size)
         for name, weight in weights.items():
             one = self.recipes[name]
             if one.minus is not None:
@@ -127,13 +127,13 @@ class Shapes:
             for member, value in one.members.items():
                 members.setdefault(member, []).append(weight * value)
             if not one.members and weight:
-                raw += weight * self._vectors[self._rows[name]]
+                raw += weight * self.vectors[self.rows[name]]
         return {member: math.fsum(several) for member, several in members.items()}, raw
 
     def read_off(self, members: Members) -> tuple[dict[str, float], dict[str, float]]:
         """Return the weights of shapes that are units themselves, and the members that are left."""
         left, weights = dict(members), {}
-        for name in self._direct:
+        for name in self.direct:
             needs = self.recipes[name].members
             weight = min(1.0, *(left.get(member, 0.0) for member in needs))
             if weight > 0.0:
@@ -149,21 +149,21 @@ class Shapes:
         weights, left = self.read_off(members)
         if not left and not moves:
             return self._ordered(weights), 0.0
-        total = _space().of(members) + (raw if moves else 0.0)
+        total = movement_space().of(members) + (raw if moves else 0.0)
         if np.linalg.norm(total) < _STILL:
             return self._ordered(weights), 0.0
         single = self._fit.weights(total, np.ones(len(self.recipes)))
         if np.count_nonzero(single) == 1:
             weights = self._named(single)
         else:
-            rest = _space().of(left) + (raw if moves else 0.0)
+            rest = movement_space().of(left) + (raw if moves else 0.0)
             free = np.array([1.0 - weights.get(name, 0.0) for name in self.recipes])
             for name, weight in self._named(self._fit.weights(rest, free)).items():
                 weights[name] = min(1.0, weights.get(name, 0.0) + weight)
         return self._ordered(weights), self._lost(total, weights)
 
     def _lost(self, total: NDArray, weights: Mapping[str, float]) -> float:
-        made = sum((weight * self._vectors[self._rows[name]] for name, weight in weights.items()), np.zeros(len(total)))
+        made = sum((weight * self.vectors[self.rows[name]] for name, weight in weights.items()), np.zeros(len(total)))
         return min(1.0, float(np.linalg.norm(total - made) / np.linalg.norm(total)))
 
     def _named(self, weights: NDArray[np.float64]) -> dict[str, float]:
@@ -179,24 +179,26 @@ class Shapes:
         return {name: weights[name] for name in self.recipes if weights.get(name)}
 
     @cached_property
-    def _rows(self) -> dict[str, int]:
+    def rows(self) -> dict[str, int]:
+        """The place of each shape in the set."""
         return {name: row for row, name in enumerate(self.recipes)}
 
     @cached_property
-    def _vectors(self) -> NDArray[np.float64]:
-        space = _space()
+    def vectors(self) -> NDArray[np.float64]:
+        """The movement (k, d) of each shape."""
+        space = movement_space()
         vectors = space.vectors(self.recipes)
         for name, one in self.recipes.items():
             if one.members:             # summed as its units are, so that they find their expression exactly
-                vectors[self._rows[name]] = space.of(one.members)
+                vectors[self.rows[name]] = space.of(one.members)
         return vectors
 
     @cached_property
     def _fit(self) -> Fit:
-        columns = self._vectors.copy()
+        columns = self.vectors.copy()
         for name, one in self.recipes.items():
             if one.minus is not None:           # the corrective and what it corrects, always together
-                columns[self._rows[name]] += self._vectors[self._rows[one.minus]]
+                columns[self.rows[name]] += self.vectors[self.rows[one.minus]]
         return Fit(columns)
 
 
@@ -219,7 +221,7 @@ class _Space:
 
     def of(self, members: Members) -> NDArray[np.float64]:
         """Return the movement (d,) of members of the unit table, summed as a rig sums them."""
-        names, basis = self._basis
+        names, basis = self.basis
         return np.array([members.get(name, 0.0) for name in names]) @ basis
 
     def of_raw(self, several: tuple[Deformation, ...]) -> NDArray[np.float64]:
@@ -230,23 +232,26 @@ class _Space:
         return (motion[:, self._rows] * self._scale).reshape(len(motion), -1)
 
     @cached_property
-    def _basis(self) -> tuple[tuple[str, ...], NDArray[np.float64]]:
+    def basis(self) -> tuple[tuple[str, ...], NDArray[np.float64]]:
+        """The members of the unit table's basis and their movement (m, d)."""
         recipes = shape_set("units")
         return tuple(next(iter(one.members)) for one in recipes.values()), self.vectors(recipes)
 
 
 @cache
-def _space() -> _Space:
+def movement_space() -> _Space:
+    """Return where movements are compared."""
     return _Space(load_face())
 
 
 def raw_movement(several: tuple[Deformation, ...]) -> NDArray[np.float64]:
     """Return raw data as a movement (d,) that `Shapes.fitted` takes."""
-    return _space().of_raw(several)
+    return movement_space().of_raw(several)
 
 
 @cache
-def _target(name: str, _person: None) -> Shapes:
+def of_set(name: str) -> Shapes:
+    """Return a set of shapes by its name."""
     return Shapes(shape_set(name))
 
 
@@ -254,10 +259,10 @@ def _as_units(members: Members, raw: NDArray[np.float64]) -> tuple[dict[str, flo
     """Return code -> weight whose combination is members of the unit table and a further movement, and the loss."""
     table, atoms = load_units(), set(load_units().catalogue.atoms)
     wanted = {member: weights_of(value) for member, value in members.items() if member in atoms}
-    total = _space().of(members) + raw
-    rest = total - _space().of(wanted)
+    total = movement_space().of(members) + raw
+    rest = total - movement_space().of(wanted)
     if np.linalg.norm(rest) > 1e-9 * max(1.0, float(np.linalg.norm(total))):
-        shapes = _target("units", None)
+        shapes = of_set("units")
         names = [next(iter(one.members)) for one in shapes.recipes.values()]
         free = np.array([1.0 - wanted.get(name, 0.0) if name in atoms else 0.0 for name in names])
         for name, weight in zip(names, shapes._fit.weights(rest, free).tolist(), strict=True):
@@ -271,7 +276,7 @@ def _as_units(members: Members, raw: NDArray[np.float64]) -> tuple[dict[str, flo
         if all(abs(better[name] - weights[name]) < 1e-15 for name in weights):
             break
         weights = better
-    made = _space().of({k: v for k, v in table.coefficients(weights).items() if not is_head(k)})
+    made = movement_space().of({k: v for k, v in table.coefficients(weights).items() if not is_head(k)})
     size = float(np.linalg.norm(total))
     lost = min(1.0, float(np.linalg.norm(total - made)) / size) if size > _STILL else 0.0
     return table.catalogue.fold({name: round(value, 12) for name, value in weights.items()}), lost
