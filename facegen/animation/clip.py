@@ -17,23 +17,23 @@ from __future__ import annotations
 import bisect
 import math
 import numbers
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from fractions import Fraction
 from functools import cache, cached_property
 from types import MappingProxyType
 
+import numpy as np
+from numpy.typing import NDArray
+
 from facegen.animation.easing import DEFAULT_EASE, EASES, eased
 from facegen.animation.idle import Idle
+from facegen.animation.motion import Timed
 from facegen.errors import InputError, nearest
+from facegen.face.rig import Rig
 from facegen.facs.deformation import Deformation, weighted_sum
-from facegen.facs.expressions import Resolution
+from facegen.facs.expressions import Resolution, resolve
 from facegen.facs.tables import load_units
 from facegen.facs.units import split_code
-
-LOWEST_FPS, HIGHEST_FPS = 0.1, 1000.0
-MOST_FRAMES = 99_999
-"""Frames of one clip: an hour at 25 a second, and what five digits number."""
 
 LONGEST = 86_400.0
 """Seconds: a day."""
@@ -163,7 +163,7 @@ class Track:
 
 
 @dataclass(frozen=True)
-class Clip:
+class Clip(Timed):
     """Timed poses in tracks, ``duration`` seconds long; make one with `load_clip` or `morph`.
 
     ``warnings``: what its poses were warned of. ::
@@ -208,20 +208,6 @@ class Clip:
         return Resolution(self, "units" if units or not raw else "deformation", f"{t:.3f} s", None, units, total,
                           more=tuple(more))
 
-    def frames(self, fps: float) -> int:
-        """Return how many frames the clip has: frame k shows the time k / fps. InputError if there are too many."""
-        if isinstance(fps, bool) or not isinstance(fps, numbers.Real) or not LOWEST_FPS <= fps <= HIGHEST_FPS:
-            raise InputError(f"fps: expected frames a second, {LOWEST_FPS:g}..{HIGHEST_FPS:g}, got {fps!r}")
-        count = max(1, round(Fraction(self.duration) * Fraction(fps)))
-        if count > MOST_FRAMES:
-            raise InputError(f"fps: {self.duration:g} s at {float(fps):g} frames a second are {count} frames; the "
-                             f"limit is {MOST_FRAMES}: take fewer a second or cut the clip")
-        return count
-
-    def times(self, fps: float) -> list[float]:
-        """Return the time of every frame, seconds; the same at every rate where the rates meet."""
-        return [frame_time(k, fps) for k in range(self.frames(fps))]
-
     def sample(self, fps: float = 25.0) -> Iterator[Resolution]:
         """Return the frames one after the other, each as `at` gives it."""
         return map(self.at, self.times(fps))
@@ -244,6 +230,24 @@ class Clip:
             for one in track.events:
                 found.update((one.at, one.at + one.onset, one.at + one.onset + one.apex, one.end))
         return tuple(sorted(t for t in found if t <= self.duration))
+
+    # -- as a motion to be filmed, see facegen.animation.motion -----------------------------------------------
+    @property
+    def shown(self) -> Clip:
+        """What workers need: the clip itself, whose cues are times."""
+        return self
+
+    def cue(self, t: float) -> float:
+        """Return the time."""
+        return t
+
+    def on(self, rig: Rig, *, detail: int = 2) -> Callable[[float], NDArray[np.float64]]:
+        """Return what makes the vertices of a time, seconds."""
+        return lambda t: rig.pose(self.at(t), detail=detail)
+
+    def check(self, rig: Rig) -> tuple[str, ...]:
+        """Return what to warn of on a rig; InputError if raw data name what it has not."""
+        return tuple(dict.fromkeys(warning for raw in self.raw for warning in rig.check(resolve(raw))))
 
     def _mixed(self, t: float) -> tuple[dict[str, float], list[tuple[float, Deformation]]]:
         """Return atom -> weight and shares of raw data at a time."""
@@ -280,11 +284,6 @@ def _opposites() -> tuple[tuple[str, str], ...]:
     """Return pairs of turns whose common part moves nothing: the weights say the turn that is left."""
     basis = load_units().basis
     return tuple((a, b) for a, b in _TURNS if basis[a] == -basis[b])
-
-
-def frame_time(k: int, fps: float) -> float:
-    """Return the time of frame k, rounded once, so that frames of different rates at one time agree to the bit."""
-    return float(Fraction(k) / Fraction(fps))
 
 
 def _add(atoms: dict[str, float], shares: Sequence[tuple[float, Pose]]) -> None:

@@ -78,7 +78,6 @@ class AvatarFace:
         self._file = avatar
         self._mesh = replace(avatar.mesh, vertices=self.notes.apply(avatar.mesh.vertices),
                              colours=avatar.vertex_colours)
-        self._moves: dict[str, tuple[NDArray[np.int64], Array]] = {}
         self._fitted: dict[Any, tuple[dict[str, float], float]] = {}
 
     # -- what there is ------------------------------------------------------------------------------------------
@@ -135,13 +134,7 @@ class AvatarFace:
     def pose(self, what: Any = "neutral", *, person: Any = None, intensity: float = 1.0, detail: int = 2) -> Array:
         """Return the vertices (n, 3), mm, under an expression: anything that the parametric face takes."""
         found = self.resolve(what, person=person, intensity=intensity)
-        vertices = self.pose_shapes(self.shape_weights(found))
-        head = _head_of(found)
-        if not head or not self.notes.framed:
-            return vertices
-        forward = head.get("forward", 0.0) * (self._mouth_width if found.deformation.units == "face" else 1.0)
-        turn = np.array([*(head.get(key, 0.0) for key in ("yaw", "pitch", "roll")), forward])
-        return turn_head(vertices, turn, self._pivot, self._neck_weight)
+        return self.turned(self.pose_shapes(self.shape_weights(found)), self.head_angles(found))
 
     def pose_shapes(self, weights: Mapping[str, float]) -> Array:
         """Return the vertices (n, 3), mm, for blendshape -> weight, by the file's own names. Weights may leave 0..1.
@@ -149,20 +142,49 @@ class AvatarFace:
         Shapes that the file's notes correct half way are corrected. No weight moves nothing: the neutral comes back bit
         for bit. InputError for a name that the file has not.
         """
+        row = np.zeros(len(self.shapes))
         for name, weight in weights.items():
-            if name not in self._file.shapes:
+            if name not in self._places:
                 raise InputError(f"weights: {self.path.name} has no shape '{name}'{nearest(name, self.shapes)}")
             if isinstance(weight, bool) or not isinstance(weight, numbers.Real) or not np.isfinite(weight):
                 raise InputError(f"weights: {name}: expected a finite number, got {weight!r}")
-        vertices = self._mesh.vertices.copy()
-        halves = {half: 4.0 * weights[name] * (1.0 - weights[name]) for name, half in self.notes.halves.items()
-                  if half in self._file.shapes and 0.0 < weights.get(name, 0.0) < 1.0}
-        for name in self.shapes:
-            weight = weights.get(name, 0.0) + halves.get(name, 0.0)
-            if weight:
-                rows, moves = self._moved(name)
-                vertices[rows] += weight * moves
-        return vertices
+            row[self._places[name]] = weight
+        return self.pose_weights(row)
+
+    def pose_weights(self, weights: Array) -> Array:
+        """Return the vertices (..., n, 3), mm, for finite weights (..., k) in the order of `shapes`.
+
+        As `pose_shapes`, for many frames and without its checks.
+        """
+        weights = np.asarray(weights, np.float64)
+        neutral = self._mesh.vertices
+        if not weights.any():
+            return np.broadcast_to(neutral, (*weights.shape[:-1], *neutral.shape)).copy()
+        moved = self._motion @ self.corrected(weights).reshape(-1, weights.shape[-1]).T     # (3 n, frames)
+        return moved.T.reshape(*weights.shape[:-1], *neutral.shape) + neutral
+
+    def corrected(self, weights: Array) -> Array:
+        """Return weights (..., k) with those of the shapes that correct others half way."""
+        if not len(self._halves):
+            return weights
+        whole, half = self._halves.T
+        between = np.clip(weights[..., whole], 0.0, 1.0)
+        weights = weights.copy()
+        np.add.at(weights, (..., half), 4.0 * between * (1.0 - between))
+        return weights
+
+    def turned(self, vertices: Array, head: Array) -> Array:
+        """Return posed vertices (..., n, 3) with the head turned: head (..., 4) is yaw, pitch, roll in degrees and
+        forward in mm. Nothing turns where the file does not say where the neck is."""
+        if not np.any(head) or not self.notes.framed:
+            return vertices
+        return turn_head(vertices, head, self.neck, self.neck_weight)
+
+    def head_angles(self, found: Resolution) -> Array:
+        """Return how the head turns (4,) in what was resolved: as `turned` takes it."""
+        head = found.deformation.head
+        forward = head.get("forward", 0.0) * (self._mouth_width if found.deformation.units == "face" else 1.0)
+        return np.array([*(head.get(key, 0.0) for key in ("yaw", "pitch", "roll")), forward])
 
     def resolve(self, what: Any, *, person: Any = None, intensity: float = 1.0) -> Resolution:
         """Return the chain name -> units -> deformation data; what has been resolved is returned as it is."""
@@ -174,6 +196,22 @@ class AvatarFace:
         """Return blendshape -> weight that shows what was resolved, as well as these shapes can."""
         return self._weights(found)[0]
 
+    def made_of(self, members: Mapping[str, float], raw: tuple[Deformation, ...] = ()
+                ) -> tuple[dict[str, float], float]:
+        """Return blendshape -> weight that makes coefficients of the unit table and a sum of raw data, as well as these
+        shapes can, and the share of the movement that is lost. InputError if no shape's name is understood."""
+        key = (tuple(members.items()), raw)
+        if key not in self._fitted:
+            if not self.known:
+                raise InputError(f"face: none of the {len(self.shapes)} blendshapes of {self.path.name} has a name "
+                                 "that is understood (units such as AU12_L, ARKit, visemes, VRM, expressions); "
+                                 "rename them, or rig the neutral: facegen rig")
+            fitted, lost = self._made_of.fitted(members, raw_movement(raw) if raw else None)
+            if len(self._fitted) >= _KEPT:
+                self._fitted.clear()
+            self._fitted[key] = self._by_name(fitted), lost
+        return self._fitted[key]
+
     def check(self, meaning: Resolution) -> tuple[str, ...]:
         """Return what to warn of: movement that these shapes cannot make, a head that cannot turn."""
         lost = self._weights(meaning)[1]
@@ -181,7 +219,7 @@ class AvatarFace:
         if lost > LOST:
             warnings.append(f"{self.path.name} has no shapes for {100 * lost:.0f} % of this movement; the nearest is "
                             "shown")
-        if _head_of(meaning) and not self.notes.framed:
+        if meaning.deformation.head and not self.notes.framed:
             warnings.append(f"{self.path.name} does not say where its neck is, so the head does not turn; "
                             "`facegen rig` notes it")
         return tuple(warnings)
@@ -193,17 +231,7 @@ class AvatarFace:
         raw = tuple(one for one in (_beyond(found, table), *found.more) if one)
         if not members and not raw:
             return {}, 0.0
-        key = (tuple(members.items()), raw)
-        if key not in self._fitted:
-            if not self.known:
-                raise InputError(f"face: none of the {len(self.shapes)} blendshapes of {self.path.name} has a name "
-                                 "that is understood (units such as AU12_L, ARKit, visemes, VRM, expressions); "
-                                 "rename them, or rig the neutral: facegen rig")
-            fitted, lost = self._made_of.fitted(_held(members), raw_movement(raw) if raw else None)
-            if len(self._fitted) >= _KEPT:
-                self._fitted.clear()
-            self._fitted[key] = self._by_name(fitted), lost
-        return self._fitted[key]
+        return self.made_of(held(members), raw)
 
     @cached_property
     def _made_of(self) -> Shapes:
@@ -217,13 +245,28 @@ class AvatarFace:
         # A corrective without the shape that it corrects means nothing.
         return Shapes({shape: one for shape, one in recipes.items() if one.minus is None or one.minus in recipes})
 
-    def _moved(self, name: str) -> tuple[NDArray[np.int64], Array]:
-        """Return the vertices that a shape moves and how (k, 3), mm; kept."""
-        if name not in self._moves:
-            moves = np.asarray(self._file.shapes[name], np.float64)
-            rows = np.flatnonzero(moves.any(axis=1))
-            self._moves[name] = rows, self.notes.vectors(moves[rows])
-        return self._moves[name]
+    @cached_property
+    def _places(self) -> dict[str, int]:
+        return {name: row for row, name in enumerate(self.shapes)}
+
+    @cached_property
+    def _halves(self) -> NDArray[np.int64]:
+        """Which shapes (h, 2) are corrected half way, and by which."""
+        pairs = [(self._places[name], self._places[half]) for name, half in self.notes.halves.items()
+                 if name in self._places and half in self._places]
+        return np.array(pairs, np.int64).reshape(-1, 2)
+
+    @cached_property
+    def _motion(self) -> sparse.csr_array:
+        """How the coordinates (3 n, k), mm, move in each shape: few vertices do in most."""
+        rows, values = [], []
+        for moves in self._file.shapes.values():
+            moving = np.flatnonzero(np.asarray(moves).any(axis=1))
+            rows.append((3 * moving[:, None] + np.arange(3)).ravel())
+            values.append(self.notes.vectors(np.asarray(moves, np.float64)[moving]).ravel())
+        columns = np.repeat(np.arange(len(rows)), [len(one) for one in rows])
+        shape = (self._mesh.vertices.size, len(rows))
+        return sparse.csr_array((np.concatenate(values), (np.concatenate(rows), columns)), shape=shape)
 
     @cached_property
     def _landmark_weights(self) -> sparse.csr_array:
@@ -247,19 +290,17 @@ class AvatarFace:
         return _MOUTH_WIDTH if any(at is None for at in corners) else float(np.linalg.norm(corners[0] - corners[1]))
 
     @property
-    def _pivot(self) -> Array:
+    def neck(self) -> Array:
+        """Where the head turns (3,), mm."""
         return _PIVOT if self.notes.neck is None else self.notes.neck
 
     @cached_property
-    def _neck_weight(self) -> Array:
-        weight = neck_weight(self._mesh.vertices, self._pivot + _MOVES_ABOVE, self._pivot + _RESTS_BELOW)
+    def neck_weight(self) -> Array:
+        """How much of the head's turn each vertex makes (n, 1)."""
+        weight = neck_weight(self._mesh.vertices, self.neck + _MOVES_ABOVE, self.neck + _RESTS_BELOW)
         for part in set(self.notes.parts("body")) & set(self._mesh.parts):
             weight[self._mesh.part_vertices(part)] = 0.0
         return weight
-
-
-def _head_of(found: Resolution) -> Mapping[str, float]:
-    return found.deformation.head
 
 
 def _beyond(found: Resolution, table: Any) -> Deformation | None:
@@ -291,8 +332,8 @@ def _closures() -> dict[str, tuple[float, float]]:
     return found
 
 
-def _held(members: Mapping[str, float]) -> dict[str, float]:
-    """Return coefficients that close no eye twice: lids that meet stop, blendshapes would go on through each other."""
+def held(members: Mapping[str, float]) -> dict[str, float]:
+    """Return coefficients of units that close no eye twice: lids that meet stop, blendshapes would pass each other."""
     held = dict(members)
     for side in (0, 1):
         closing = {name: value * _closures()[name][side] for name, value in held.items() if name in _closures()}

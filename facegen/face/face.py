@@ -6,7 +6,7 @@ no code. A face is a rig: ``pose(what)`` gives vertices, ``mesh(detail)`` what t
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache, cached_property, lru_cache
 from pathlib import Path
@@ -180,36 +180,50 @@ class Face:
         """
         if more:
             deformation = weighted_sum([(1.0, self._in_millimetres(one)) for one in (deformation, *more)])
+        linear = self.linear_controls(deformation, strict=strict)
+        turning = [row for name in deformation.with_jaw if (row := self._point(name, strict)) is not None]
+        return self.finished_controls(linear, turning)
+
+    def linear_controls(self, deformation: Deformation, *, strict: bool = True) -> Controls:
+        """Return the part of `controls` that adds: that of a sum of deformations is the sum of theirs."""
         d = self._data
         scale, mouth = self._lengths(deformation.units)
         vectors = np.zeros((len(d.point_names), 3))
         for name, vector in deformation.points.items():
             row = self._point(name, strict)
-            if row is None:
-                continue
-            vectors[row] += np.asarray(vector, float) * scale[row]
-        open_side_forward = np.array([deformation.jaw.get(k, 0.0) for k in ("open", "side", "forward")])
-        jaw_state = open_side_forward * [1.0, mouth[0], mouth[2]]
-        for name in deformation.with_jaw:
-            row = self._point(name, strict)
-            if row is None:
-                continue
-            if not self.deformer.jaw_share[row]:
-                vectors[row] += self.deformer.jaw.movement(self.deformer.points[[row]], jaw_state)[0]
+            if row is not None:
+                vectors[row] += np.asarray(vector, float) * scale[row]
+        jaw = np.array([deformation.jaw.get(k, 0.0) for k in ("open", "side", "forward")]) * [1.0, mouth[0], mouth[2]]
         eyes = np.array([deformation.eyes.get(k, 0.0) for k in ("yaw_L", "pitch_L", "yaw_R", "pitch_R")])
         lids = np.array([deformation.lids.get(k, 0.0) for k in ("upper_L", "lower_L", "upper_R", "lower_R")])
-        for i, pitch in enumerate(eyes[[1, 3]]):            # lids follow the gaze as far as they are open
-            pair = slice(2 * i, 2 * i + 2)
-            openness = 1.0 - np.clip(lids[pair].sum(), 0.0, 1.0)
-            lids[pair] += d.lid_follow[int(pitch > 0)] * abs(pitch) * openness
         head = np.array([*(deformation.head.get(k, 0.0) for k in ("yaw", "pitch", "roll")),
                          deformation.head.get("forward", 0.0) * mouth[2]])
         for name in deformation.folds:
             if name not in d.folds and strict:
                 raise InputError(f"folds: {name!r} is no fold of the face {self.name!r}{nearest(name, d.folds)}")
+        return Controls(vectors, jaw, lids, eyes, head, np.array([deformation.folds.get(k, 0.0) for k in d.folds]))
+
+    def finished_controls(self, linear: Controls, turning: Sequence[int] = ()) -> Controls:
+        """Return the deformer's input for a sum of `linear_controls`: lids follow the gaze, folds end.
+
+        turning: rows of feature points that turn with the jaw in this pose though they need not.
+        """
+        d = self._data
+        vectors, lids = linear.vectors, linear.lids
+        turning = [row for row in turning if not self.deformer.jaw_share[row]]
+        if turning:
+            vectors = vectors.copy()
+            for row in turning:
+                vectors[row] += self.deformer.jaw.movement(self.deformer.points[[row]], linear.jaw)[0]
+        if linear.eyes.any():
+            lids = lids.copy()
+            for i, pitch in enumerate(linear.eyes[[1, 3]]):     # lids follow the gaze as far as they are open
+                pair = slice(2 * i, 2 * i + 2)
+                openness = 1.0 - np.clip(lids[pair].sum(), 0.0, 1.0)
+                lids[pair] += d.lid_follow[int(pitch > 0)] * abs(pitch) * openness
         # Folds saturate: two units that crease the same skin do not crease it twice as deep.
-        folds = np.minimum(np.array([deformation.folds.get(k, 0.0) for k in d.folds]), DEEPEST_FOLD)
-        return Controls(vectors, jaw_state, lids, eyes, head, folds)
+        folds = np.minimum(linear.folds, DEEPEST_FOLD)
+        return Controls(vectors, linear.jaw, lids, linear.eyes, linear.head, folds)
 
     def pose_controls(self, controls: Controls, *, detail: int = 2) -> Array:
         """Return vertices (..., n, 3), mm, of ``mesh(detail)`` for (a batch of) controls."""

@@ -1,4 +1,4 @@
-"""Clips and turns of the camera as films: frames over processes, taken up again where a run stopped.
+"""Clips, recordings and turns of the camera as films: frames over processes, taken up again where a run stopped.
 
 Frames are PNG files in a folder, each whole or not there. A stamp in the folder holds a fingerprint of all that the
 frames depend on, so that only frames of the same film are kept; a film's frames lie in a hidden folder beside it until
@@ -20,8 +20,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from facegen import __version__
-from facegen.animation.clip import Clip, frame_time
+from facegen.animation.clip import Clip
 from facegen.animation.easing import min_jerk
+from facegen.animation.motion import Motion, Shown, Timed, frame_time
+from facegen.animation.performance import Performance
+from facegen.animation.playback import Playback
 from facegen.data import tables_dir
 from facegen.errors import FileError, InputError, TableError
 from facegen.face.face import face_names, load_face
@@ -49,10 +52,10 @@ _LEVEL = 1                  # of PNG compression: frames are read once and remov
 class Shot:
     """All that the frames of a film depend on; pickled for every worker.
 
-    what: a clip, or for a turn one pose. cameras: one for all frames, or one each.
+    what: the part of a motion that all frames share, or for a turn one pose. cameras: one for all frames, or one each.
     """
 
-    what: Clip | Resolution
+    what: Shown | Resolution
     fps: float
     frames: int
     face: str
@@ -67,26 +70,27 @@ class Shot:
         files = [file_digest(path) for path in sorted(tables_dir().glob("*.yaml"))]
         return digest_of([__version__, _plain(self), files, face_digest(self.face, fresh=True)])
 
-    def prepare(self) -> Callable[[int], NDArray[np.uint8]]:
-        """Return what draws frame k; made once in a worker."""
+    def prepare(self) -> Callable[[Any], NDArray[np.uint8]]:
+        """Return what draws the frame of a cue, which is the frame's number for a turn; made once in a worker."""
         face = load_face(self.face)
 
         def renderer(camera: Camera) -> Renderer:
             return Renderer(face, detail=self.detail, background=self.background, renderer=self.renderer, camera=camera)
 
-        if len(self.cameras) > 1:
+        if isinstance(self.what, Resolution):
             vertices = face.pose(self.what, detail=self.detail)
             return lambda k: renderer(self.cameras[k]).draw(vertices)
-        only = renderer(self.cameras[0])
-        return lambda k: only.draw(self.what.at(frame_time(k, self.fps)))
+        only, pose = renderer(self.cameras[0]), self.what.on(face, detail=self.detail)
+        return lambda cue: only.draw(pose(cue))
 
 
 @dataclass(frozen=True)
 class FrameTask:
-    """One frame (counted from 0) as a PNG file."""
+    """One frame (counted from 0) as a PNG file. ``cue``: what it shows, as the shot's `prepare` takes it."""
 
     shot: Shot
     index: int
+    cue: Any
     output: Path
     group: str
 
@@ -98,20 +102,20 @@ class FrameTask:
         """Draw it."""
         from PIL import Image
 
-        pixels = without_full_alpha(shared(self.group, self.shot.prepare)(self.index))
+        pixels = without_full_alpha(shared(self.group, self.shot.prepare)(self.cue))
         write_whole(Image.fromarray(pixels), self.output, "frame", compress_level=_LEVEL)
 
 
-def save_clip(clip: Clip, path: str | os.PathLike[str], *, fps: float = 25.0, size: int | tuple[int, int] = 512,
-              view: tuple[float, float] = (0.0, 0.0), face: str | os.PathLike[str] = "akimoto",
-              detail: int | None = None, background: Any = "plain", renderer: str = "auto", workers: int = 1,
-              step: Callable[[], None] | None = None) -> Report:
-    """Draw a clip into a film, or into a folder of numbered pictures, and say what was done.
+def save_clip(clip: Motion | Performance, path: str | os.PathLike[str], *, fps: float = 25.0,
+              size: int | tuple[int, int] = 512, view: tuple[float, float] = (0.0, 0.0),
+              face: str | os.PathLike[str] = "akimoto", detail: int | None = None, background: Any = "plain",
+              renderer: str = "auto", workers: int = 1, step: Callable[[], None] | None = None) -> Report:
+    """Draw a clip, or a recording, into a film or into a folder of numbered pictures, and say what was done.
 
-    path: .mp4, .webm, .gif, .webp, .apng or .png; a name without suffix is a folder that gets ``frame_00001.png`` and
-    so on. face: a face's name or path. workers: processes that draw; in a script, more than 1 needs the usual
-    ``if __name__ == "__main__":``. step: called once a frame. The rest is as for `Renderer`; the camera stands still
-    and shows all that the clip reaches.
+    clip: a `Clip`, a `Performance`, or a `Playback` of one. path: .mp4, .webm, .gif, .webp, .apng or .png; a name
+    without suffix is a folder that gets ``frame_00001.png`` and so on. face: a face's name or path. workers: processes
+    that draw; in a script, more than 1 needs the usual ``if __name__ == "__main__":``. step: called once a frame. The
+    rest is as for `Renderer`; the camera stands still and shows all that the clip reaches.
 
     The same call after a stop goes on where it stopped. Raises InputError, or FileError for the path, before work
     starts. ::
@@ -119,16 +123,25 @@ def save_clip(clip: Clip, path: str | os.PathLike[str], *, fps: float = 25.0, si
         facegen.save_clip(facegen.load_clip("greeting.yaml"), "greeting.mp4")
     """
     size, view = check_size(size), check_view(view)
-    if not isinstance(clip, Clip):
-        raise InputError(f"clip: expected a Clip, as load_clip and morph make them, got {type(clip).__name__}")
+    clip = as_motion(clip)
     count = clip.frames(fps)
     rig, name, mesh, level, chosen = _prepared(face, size, view, detail, background, renderer, count)
-    for raw in clip.raw:
-        rig.check(resolve(raw))         # a point that this face lacks is said now
+    clip.check(rig)                     # a point that this face lacks is said now
     target = _Target(Path(path), size, fps)
     head = portrait(rig, mesh.vertices)
     camera = frame(head, _reach(rig, clip, frame(head, size=size, view=view)), size=size, view=view)
-    return target.fill(Shot(clip, float(fps), count, name, level, background, chosen, (camera,)), workers, step)
+    shot = Shot(clip.shown, float(fps), count, name, level, background, chosen, (camera,))
+    return target.fill(shot, [clip.cue(frame_time(k, fps)) for k in range(count)], workers, step)
+
+
+def as_motion(clip: Motion | Performance) -> Motion:
+    """Return what is to be filmed, a performance as its playback; InputError for anything else."""
+    if isinstance(clip, Performance):
+        return Playback(clip)
+    if not isinstance(clip, Timed):
+        raise InputError("clip: expected a Clip, as load_clip and morph make them, or a Performance, as "
+                         f"load_performance reads them, got {type(clip).__name__}")
+    return clip
 
 
 def save_turn(what: Any, path: str | os.PathLike[str], *, seconds: float = 4.0, fps: float = 25.0,
@@ -158,7 +171,8 @@ def save_turn(what: Any, path: str | os.PathLike[str], *, seconds: float = 4.0, 
     target = _Target(Path(path), size, fps)
     reach = np.concatenate([portrait(rig, mesh.vertices), portrait(rig, posed)])
     cameras = _orbit(reach, size, [(yaw, pitch) for yaw in yaws])
-    return target.fill(Shot(pose, float(fps), count, name, level, background, chosen, cameras), workers, step)
+    return target.fill(Shot(pose, float(fps), count, name, level, background, chosen, cameras), range(count), workers,
+                       step)
 
 
 def _prepared(face: object, size: tuple[int, int], view: tuple[float, float], detail: int | None, background: Any,
@@ -176,13 +190,13 @@ def _prepared(face: object, size: tuple[int, int], view: tuple[float, float], de
     return rig, name, mesh, int(level or 0), chosen
 
 
-def _reach(rig: Rig, clip: Clip, camera: Camera) -> NDArray[np.float64]:
+def _reach(rig: Rig, clip: Motion, camera: Camera) -> NDArray[np.float64]:
     """Return the vertices (k, 3) that go farthest left, right, up and down in the picture during a clip."""
     count = min(_TRIES // 2, 10 * int(clip.duration) + 10)
     times = [*np.linspace(0.0, clip.duration, count), *clip.corners[:: 1 + len(clip.corners) // (_TRIES // 2)]]
-    found = []
+    found, pose = [], clip.shown.on(rig, detail=0)
     for t in times:
-        vertices = portrait(rig, rig.pose(clip.at(float(t)), detail=0))
+        vertices = portrait(rig, pose(clip.cue(float(t))))
         points = camera.project(vertices)[:, :2]
         found.append(vertices[np.concatenate([points.argmin(axis=0), points.argmax(axis=0)])])
     return np.concatenate(found)
@@ -221,11 +235,12 @@ class _Target:
             raise FileError(f"{path}: holds frames that facegen did not make here; choose another folder or remove "
                             "them")
 
-    def fill(self, shot: Shot, workers: int, step: Callable[[], None] | None) -> Report:
-        """Draw what is missing and put the film together."""
+    def fill(self, shot: Shot, cues: Sequence[Any], workers: int, step: Callable[[], None] | None) -> Report:
+        """Draw what is missing and put the film together. cues: of every frame."""
         self._open(shot)
         paths = [self.folder / f"frame_{k:05d}.png" for k in range(1, shot.frames + 1)]
-        tasks = [FrameTask(shot, k, path, shot.fingerprint) for k, path in enumerate(paths)]
+        tasks = [FrameTask(shot, k, cue, path, shot.fingerprint)
+                 for k, (cue, path) in enumerate(zip(cues, paths, strict=True))]
         if workers > 1:
             warm(shot.renderer, coloured=load_face(shot.face).mesh(shot.detail).colours is not None)
         report = run(tasks, workers=workers, step=step)

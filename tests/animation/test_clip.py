@@ -11,8 +11,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import facegen
-from facegen.animation.clip import MOST_FRAMES, Clip, Event, Keyframe, Pose, Track
+from facegen.animation.clip import Clip, Event, Keyframe, Pose, Track
 from facegen.animation.easing import EASES, eased
+from facegen.animation.motion import MOST_FRAMES
 
 SMILE = {"t": 1, "pose": "6C+12D"}
 WEIGHTS = st.dictionaries(st.sampled_from(["1", "L2", "4", "12", "R14", "25", "43", "51", "61", "T23"]),

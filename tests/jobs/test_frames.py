@@ -250,3 +250,51 @@ def test_a_folder_with_a_films_name(tmp_path):
     with pytest.raises(facegen.FileError, match=r"film\.mp4: is a folder, expected a file"):
         save_clip(facegen.morph("0", "12"), tmp_path / "film.mp4", size=32, fps=2)
     assert not list((tmp_path / "film.mp4").iterdir())
+
+
+def recorded(seconds=0.4):
+    """Return a smile with a turn of the head and a gap, as a camera might have seen it."""
+    t = np.arange(round(seconds * 30)) / 30
+    weights = np.stack([t / t[-1], np.where((t > 0.1) & (t < 0.2), np.nan, 0.3)], axis=1)
+    return facegen.Performance(t + 7.0, ("mouthSmileLeft", "jawOpen"), weights, "arkit",
+                               head=np.stack([40 * t, 0 * t, 0 * t], axis=1))
+
+
+def test_a_recording(tmp_path, monkeypatch):
+    from facegen.animation.playback import Playback
+
+    out, play = tmp_path / "frames", Playback(recorded())
+    assert save_clip(recorded(), out, fps=10, **QUICK).made == 4
+    face = facegen.load_face("akimoto-1986")
+    renderer = facegen.Renderer(face, size=32, detail=0, renderer="soft")
+    pose = play.shown.on(face, detail=0)
+    drawn_before = []
+    for k, path in enumerate(sorted(out.glob("frame_*.png"))):
+        with Image.open(path) as picture:
+            drawn_before.append(np.asarray(picture))
+        assert drawn_before[-1].shape == (32, 32, 3)
+        assert np.isfinite(renderer.draw(pose(play.cue(k / 10)))).all()
+    assert np.abs(drawn_before[0].astype(int) - drawn_before[3]).max() > 20
+    again = drawn(monkeypatch)
+    assert save_clip(play, out, fps=10, **QUICK).kept == 4
+    assert not again
+    assert save_clip(Playback(recorded(), bridge=0.0), out, fps=10, **QUICK).kept == 4    # a level gap
+    other = facegen.Performance(play.moments, ("mouthSmileLeft",), play.filled.weights[:, :1] * 0.9, "arkit")
+    assert save_clip(other, out, fps=10, **QUICK).made == 4
+
+
+def test_a_recording_on_an_avatar_over_workers(tmp_path, rig_file):
+    for workers in (1, 2):
+        save_clip(recorded(0.2), tmp_path / str(workers), fps=10, workers=workers,
+                  **{**QUICK, "face": rig_file("arkit")})
+    names = sorted(path.name for path in (tmp_path / "1").glob("*.png"))
+    assert len(names) == 2
+    for name in names:
+        assert (tmp_path / "1" / name).read_bytes() == (tmp_path / "2" / name).read_bytes()
+
+
+def test_a_recording_that_the_face_cannot_show(tmp_path):
+    alien = facegen.Performance([0.0, 0.1], ("gills",), np.zeros((2, 1)), "shapes")
+    with pytest.raises(facegen.InputError, match="can show none of the 1 shapes: gills"):
+        save_clip(alien, tmp_path / "a.gif", fps=10, **QUICK)
+    assert not list(tmp_path.iterdir())

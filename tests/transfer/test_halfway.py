@@ -34,11 +34,12 @@ def test_half_closed_lids_go_round_a_large_eye(cartoon):
 
 
 def test_the_corrective_is_nothing_at_both_ends(cartoon):
-    rest, moves = cartoon.mesh().vertices, cartoon._moved("AU43_L")
+    rest, halves = cartoon.mesh().vertices, dict(cartoon.notes.halves)
     np.testing.assert_array_equal(cartoon.pose_shapes({}), rest)
-    whole = rest.copy()
-    whole[moves[0]] += moves[1]
-    np.testing.assert_array_equal(cartoon.pose_shapes({"AU43_L": 1.0}), whole)
+    whole = cartoon.pose_shapes({"AU43_L": 1.0})
+    np.testing.assert_array_equal(cartoon.pose_shapes({"AU43_L": 1.0, halves["AU43_L"]: 0.0}), whole)
+    made = rest + cartoon.notes.vectors(load_avatar(cartoon.path).shapes["AU43_L"])
+    np.testing.assert_allclose(whole, made, atol=1e-9)
     more = cartoon.pose_shapes({"AU43_L": 1.2}) - rest                      # beyond, a shape goes straight on
     np.testing.assert_allclose(more, 1.2 * (whole - rest), atol=1e-9)
 
