@@ -22,6 +22,9 @@ if TYPE_CHECKING:
     from facegen.animation.script import load_clip, morph
     from facegen.animation.streams.files import load_performance, save_performance
     from facegen.blendshapes.recipes import Recipe, shape_set
+    from facegen.codec.decoder import Decoder
+    from facegen.codec.encoder import Encoder
+    from facegen.codec.recording import decode_packets, encode_performance
     from facegen.errors import FacegenError, FileError, InputError, JobError, NotationError, TableError
     from facegen.face.avatar import AvatarFace
     from facegen.face.convert import Conversion, convert
@@ -49,7 +52,9 @@ __all__ = [
     "Clip",
     "Controls",
     "Conversion",
+    "Decoder",
     "Deformation",
+    "Encoder",
     "Face",
     "FacegenError",
     "FileError",
@@ -67,6 +72,8 @@ __all__ = [
     "canonical",
     "contact_sheet",
     "convert",
+    "decode_packets",
+    "encode_performance",
     "face_names",
     "load_avatar",
     "load_clip",
@@ -102,6 +109,9 @@ _HOMES = {
     "facegen.animation.script": ("load_clip", "morph"),
     "facegen.animation.streams.files": ("load_performance", "save_performance"),
     "facegen.blendshapes.recipes": ("Recipe", "shape_set"),
+    "facegen.codec.decoder": ("Decoder",),
+    "facegen.codec.encoder": ("Encoder",),
+    "facegen.codec.recording": ("decode_packets", "encode_performance"),
     "facegen.errors": ("FacegenError", "FileError", "InputError", "JobError", "NotationError", "TableError"),
     "facegen.face.avatar": ("AvatarFace",),
     "facegen.face.convert": ("Conversion", "convert"),

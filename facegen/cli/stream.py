@@ -14,26 +14,38 @@ import typer
 
 from facegen.cli.options import FaceName, Json, PersonName, Quiet, Size, View, print_json, read_size, read_view, warn
 from facegen.cli.picture import RendererName
+from facegen.cli.recordings import (
+    Calibrate,
+    CalibrateHead,
+    FaceId,
+    RecordedRate,
+    Smooth,
+    Source,
+    read_recording,
+)
 from facegen.errors import FileError, InputError
 
 if TYPE_CHECKING:
-    from facegen.animation.performance import Performance
     from facegen.codec.decoder import Frame
 
 _PIPE = "-"
 _SCRIPTS = (".yaml", ".yml")
+_OWN = "csv"
+_PATIENT, _LIVE = 16, 2     # packets that a missing one is waited for
+_DAY = 86_400.0
 
-Source = Annotated[Path, typer.Argument(
-    metavar="IN", help="A recording (OpenFace, py-feat, Live Link ... CSV, a .glb with weights ...) or a clip (.yaml).")]
+Recording = Annotated[Path, typer.Argument(
+    metavar="IN", help="A recording (`facegen list formats`), or a clip (.yaml).")]
 Sink = Annotated[str, typer.Option(
     "--output", "-o", metavar="OUT", help="A file, - for a pipe, or udp://HOST:PORT.")]
-Rate = Annotated[float, typer.Option("--fps", metavar="N", help="Frames a second that are sent.")]
+Rate = Annotated[float, typer.Option("--rate", metavar="N", help="Frames a second that are sent.")]
 Quality = Annotated[float | None, typer.Option(
-    "--quality", metavar="MM", help="Millimetres of the face's movement in a step: more is coarser. [default: 0.9]")]
+    "--quality", metavar="MM", help="Millimetres of the face's movement in a step: more is coarser. [default: 0.8]")]
 FramesEach = Annotated[int, typer.Option(
     "--frames", metavar="N", help="Frames of a packet, 1 to 64: fewer is less delay and more bits.")]
 KeyEvery = Annotated[int, typer.Option(
-    "--key-every", metavar="N", help="Of so many packets one needs no other; 1: a lost packet costs its own frames only.")]
+    "--key-every", metavar="N", help="Of so many packets one needs no other; of 1, a lost one costs its own frames "
+                                     "only.")]
 Parts = Annotated[str | None, typer.Option(
     "--parts", metavar="PARTS", help="What is sent beside weights, by commas: head, place, gaze, or none. "
                                      "[default: head and gaze where there are]")]
@@ -41,17 +53,22 @@ Realtime = Annotated[bool, typer.Option("--realtime", help="Send each frame at i
 Incoming = Annotated[str, typer.Argument(metavar="IN", help="A file, - for a pipe, or udp://[HOST]:PORT to listen at.")]
 Outputs = Annotated[list[Path] | None, typer.Option(
     "--output", "-o", metavar="OUT", help="A recording in any format that facegen writes; repeatable.")]
+Target = Annotated[str | None, typer.Option(
+    "--to", metavar="FORMAT", help="What the recordings are to be (`facegen list formats`); of .csv, facegen's own.")]
 Shown = Annotated[Path | None, typer.Option(
-    "--render", metavar="OUT", help="Draw the frames as they come: a film (.mp4, .gif ...), or a folder of pictures.")]
+    "--render", metavar="OUT", help="Draw the frames: a film (.mp4, .gif ...) at the end, or, for a name without "
+                                    "suffix, a folder of pictures that fills as they come.")]
 Wait = Annotated[int | None, typer.Option(
-    "--wait", metavar="N", help="Packets that a missing one is waited for. [default: 16; 2 with --render]")]
+    "--wait", metavar="N", help="Packets that a missing one is waited for. [default: 16; 2 for pictures as they come]")]
 Timeout = Annotated[float, typer.Option("--timeout", metavar="S", help="Seconds of silence after which UDP is over.")]
 
 
-def encode(source: Source, output: Sink = _PIPE, fps: Rate = 25.0, quality: Quality = None, frames: FramesEach = 16,
-           key_every: KeyEvery = 1, parts: Parts = None, realtime: Realtime = False, person: PersonName = None,
-           json: Json = False, quiet: Quiet = False) -> None:
-    """Send a performance as a stream of about 1 kbit/s.
+def encode(recording: Recording, output: Sink = _PIPE, rate: Rate = 25.0, quality: Quality = None,
+           frames: FramesEach = 16, key_every: KeyEvery = 1, parts: Parts = None, realtime: Realtime = False,
+           source: Source = None, fps: RecordedRate = None, face_id: FaceId = None, calibrate: Calibrate = None,
+           calibrate_head: CalibrateHead = False, smooth: Smooth = None, person: PersonName = None, json: Json = False,
+           quiet: Quiet = False) -> None:
+    """Send a performance as a stream of less than 1 kbit/s.
 
     For example: facegen encode recording.csv -o talk.fgp
     Or: facegen encode recording.csv -o udp://192.168.1.7:5004 --realtime
@@ -63,31 +80,42 @@ def encode(source: Source, output: Sink = _PIPE, fps: Rate = 25.0, quality: Qual
     address = read_address(output, sends=True) if output.startswith(SCHEME) else None
     if json and output == _PIPE:
         raise InputError("--json: stdout carries the stream; take -o FILE")
-    performance = in_order(_loaded(source, person))
-    encoder = encoder_for(performance, fps=fps, parts=_parts(parts), quality=QUALITY if quality is None else quality,
-                          frames=frames, key_every=key_every)
+    if recording.suffix.lower() in _SCRIPTS:
+        from facegen.animation.script import load_clip
+        from facegen.codec.sampled import clip_performance
+
+        performance = clip_performance(load_clip(recording, person=person), rate)
+        if not quiet:
+            warn(performance.warnings)
+    else:
+        performance = read_recording(recording, source=source, fps=fps, face_id=face_id, calibrate=calibrate,
+                                     calibrate_head=calibrate_head, smooth=smooth, quiet=quiet)
+    performance = in_order(performance)
+    try:
+        encoder = encoder_for(performance, fps=rate, parts=_parts(parts), frames=frames, key_every=key_every,
+                              quality=QUALITY if quality is None else quality)
+    except InputError as error:
+        raise InputError(_named(str(error))) from error
     courses = rows(performance, encoder.dictionary.rate)
     if address is not None:
         count = send_udp(encoder, courses, address, realtime=realtime)
     else:
         with _writer(output) as file:
             count = write_stream(encoder, courses, file, realtime=realtime)
-    told = encoder.told()
+    seconds = encoder.frames_taken / float(encoder.dictionary.rate)
     if not quiet:
-        warn((*performance.warnings, *told))
-    seconds = max(encoder.frames_taken / float(encoder.dictionary.rate), 1e-9)
-    if json:
-        print_json({"output": output, "frames": encoder.frames_taken, "fps": float(encoder.dictionary.rate),
-                    "bytes": count, "bits_per_second": 8 * count / seconds,
-                    "warnings": [*performance.warnings, *told]})
-    elif not quiet:
+        warn(encoder.told())
         print(f"{output}: {encoder.frames_taken} frames in {count} bytes, {8 * count / seconds:.0f} bit/s",
               file=sys.stderr)
+    if json:
+        print_json({"output": output, "frames": encoder.frames_taken, "rate": float(encoder.dictionary.rate),
+                    "bytes": count, "bits_per_second": 8 * count / seconds, "names": list(encoder.dictionary.names),
+                    "parts": list(encoder.dictionary.parts), "warnings": [*performance.warnings, *encoder.told()]})
 
 
-def decode(source: Incoming = _PIPE, output: Outputs = None, render: Shown = None, face: FaceName = "akimoto",
-           size: Size = "512", view: View = "0,0", renderer: RendererName = "auto", wait: Wait = None,
-           timeout: Timeout = 30.0, json: Json = False, quiet: Quiet = False) -> None:
+def decode(source: Incoming = _PIPE, output: Outputs = None, target: Target = None, render: Shown = None,
+           face: FaceName = "akimoto", size: Size = "512", view: View = "0,0", renderer: RendererName = "auto",
+           wait: Wait = None, timeout: Timeout = 30.0, json: Json = False, quiet: Quiet = False) -> None:
     """Receive a stream, and write it as a recording or draw it.
 
     For example: facegen encode recording.csv | facegen decode -o again.csv
@@ -96,44 +124,68 @@ def decode(source: Incoming = _PIPE, output: Outputs = None, render: Shown = Non
     outputs = list(output or ())
     if not outputs and render is None:
         raise InputError("-o: say where the recording goes, for example -o out.csv, or --render out.mp4")
+    if not 0 < timeout <= _DAY:
+        raise InputError(f"--timeout: expected seconds above 0 and up to a day, got {timeout:g}")
+    from facegen.animation.streams import save_performance
+    from facegen.animation.streams.formats import for_output
     from facegen.codec.decoder import Decoder
     from facegen.codec.link import SCHEME, read_address, read_stream, receive_udp
     from facegen.codec.recording import performance_of
+    from facegen.fileio.textfile import check_place
 
     address = read_address(source, sends=False) if source.startswith(SCHEME) else None
-    if not 0 < timeout <= 86_400:
-        raise InputError(f"--timeout: expected seconds above 0 and up to a day, got {timeout:g}")
-    for path in outputs:
-        _check_output(path)
-    decoder = Decoder(wait=(16 if render is None else 2) if wait is None else wait)
-    show = None
-    if render is not None:
-        from facegen.jobs.receiver import Receiver
+    kinds = [for_output(path, target, _OWN) for path in outputs]
+    for path, kind in zip(outputs, kinds, strict=True):     # before anything is received
+        check_place(path, kind.suffixes)
+    pixels, angles = read_size(size), read_view(view)
+    film, live = None, None
+    if render is not None and render.suffix:
+        from facegen.fileio.video import check_film
 
-        show = Receiver(render, face=face, size=read_size(size), view=read_view(view), renderer=renderer)
+        check_film(film := render, size=pixels, fps=25.0)
+    decoder = Decoder(wait=(_PATIENT if render is None or film else _LIVE) if wait is None else wait)
+    if render is not None and film is None:
+        from facegen.jobs.live import LivePictures
+
+        live = LivePictures(render, face=face, size=pixels, view=angles, renderer=renderer)
     kept: list[Frame] = []
     with _stoppable() as stop, (nullcontext() if address is not None else _reader(source)) as file:
-        if address is not None:
-            frames = receive_udp(decoder, address, timeout=timeout, stopped=stop.asked,
-                                 ready=lambda: _listening(source, quiet))
-        else:
-            frames = read_stream(decoder, stop.watched(file), stopped=stop.asked)
-        frames = _kept(frames, kept)
-        if show is not None:
-            show.show(decoder, frames)
-        for _ in frames:
-            pass
+        frames = receive_udp(decoder, address, timeout=timeout, stopped=stop.asked,
+                             ready=lambda: _listening(source, quiet)) if address is not None else \
+            read_stream(decoder, stop.watched(file), stopped=stop.asked)
+        for one in frames:
+            kept.append(one)
+            if live is not None:
+                live.draw(one, decoder.dictionary)
     performance = performance_of(decoder, kept)
-    _save(performance, outputs)
+    said = list(performance.warnings) + list(live.warnings if live is not None else ())
+    for path, kind in zip(outputs, kinds, strict=True):
+        said += [one for one in save_performance(performance, path, kind.name).warnings if one not in said]
+    if film is not None:
+        from facegen.cli.options import progress
+        from facegen.jobs.frames import as_motion, save_clip
+
+        rate = float(decoder.dictionary.rate)
+        said += [one for one in as_motion(performance).warnings if one not in said]
+        with progress("frames", as_motion(performance).frames(rate), quiet=quiet) as step:
+            save_clip(performance, film, fps=rate, size=pixels, view=angles, face=face, renderer=renderer, step=step)
     if not quiet:
-        warn((*performance.warnings, *(show.warnings if show else ())))
+        warn(said)
         print(f"{source}: {len(kept)} frames" + (", stopped" if stop.asked() else ""), file=sys.stderr)
     if json:
         print_json({"input": source, "frames": len(kept), "seconds": kept[-1].time, "outputs": list(map(str, outputs)),
                     "render": None if render is None else str(render), "received": vars(decoder.received),
-                    "stopped": stop.asked(), "warnings": list(performance.warnings)})
+                    "stopped": stop.asked(), "warnings": said})
     if stop.asked():
         raise typer.Exit(1)
+
+
+def _named(message: str) -> str:
+    """Return an error of the encoder with the option's name before it."""
+    names = {"fps": "--rate", "quality": "--quality", "frames": "--frames", "key_every": "--key-every",
+             "parts": "--parts"}
+    name, colon, rest = message.partition(":")
+    return f"{names[name]}{colon}{rest}" if name in names else message
 
 
 def _parts(text: str | None) -> list[str] | None:
@@ -141,30 +193,6 @@ def _parts(text: str | None) -> list[str] | None:
     if text is None:
         return None
     return [part.strip() for part in text.split(",") if part.strip() not in ("", "none")]
-
-
-def _loaded(source: Path, person: str | None) -> Performance:
-    if source.suffix.lower() in _SCRIPTS:
-        from facegen.animation.script import load_clip
-        from facegen.codec.sampled import clip_performance
-
-        return clip_performance(load_clip(source, person=person))
-    from facegen.codec.files import load
-
-    return load(source)
-
-
-def _check_output(path: Path) -> None:
-    from facegen.codec.files import check
-
-    check(path)
-
-
-def _save(performance: Performance, outputs: list[Path]) -> None:
-    from facegen.codec.files import save
-
-    for path in outputs:
-        save(performance, path)
 
 
 @contextmanager
@@ -192,12 +220,6 @@ def _reader(source: str) -> Iterator[BinaryIO]:
             yield file
     except OSError as error:
         raise FileError(f"{source}: cannot be read: {error.strerror or error}") from error
-
-
-def _kept(frames: Iterator[Frame], kept: list[Frame]) -> Iterator[Frame]:
-    for frame in frames:
-        kept.append(frame)
-        yield frame
 
 
 def _listening(source: str, quiet: bool) -> None:

@@ -83,7 +83,7 @@ class Dictionary:
     def kinds(self) -> tuple[int, ...]:
         """The kind of every parameter."""
         kinds = [WEIGHT] * len(self.names)
-        for left, right in self.pairs:
+        for _, right in self.pairs:
             kinds[right] = SIDE
         return (*kinds, *(EYE if name in GAZES else HEAD for name in self.extras))
 

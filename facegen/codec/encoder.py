@@ -77,7 +77,7 @@ class Encoder:
             raise InputError(f"steps: there is no {unknown[0]!r} among the names{nearest(unknown[0], draft.names)}")
         wanted = np.minimum(self.quality / np.maximum(movement(draft.vocabulary, draft.names), 1e-9), COARSEST)
         for name, step in given.items():
-            wanted[draft.names.index(name)] = _number(f"steps: {name}", step, 0.001, 64.0)
+            wanted[draft.names.index(name)] = _number(f"steps: {name}", step, 0.002, 64.0)
         for a, b in draft.pairs:
             finest = min(wanted[a], wanted[b])
             wanted[a], wanted[b] = finest / math.sqrt(2), finest * math.sqrt(2)     # errors as of two alone
@@ -186,12 +186,11 @@ class Encoder:
         models = Models() if key else self._models.copy()
         coder, motion = RangeEncoder(), Motion(found)
         if any(found):
-            kinds = self.dictionary.kinds
-            rests, at = still(courses, None if before is None else np.array(before), trade=trade)
-            first, last = -1 if before is not None else 0, len(found) - 1
-            motion.curves = [{first: stands, last: stands} if rest else
-                             plan_curve(courses[:, k], None if before is None else before[k], kinds[k], trade=trade,
-                                        reach=reach) for k, (rest, stands) in enumerate(zip(rests.tolist(), at.tolist(), strict=True))]
+            first, last = 0 if key else -1, len(found) - 1
+            rests, at = still(courses, None if key else np.array(before), trade=trade)
+            for k, (rest, step) in enumerate(zip(rests.tolist(), at.tolist(), strict=True)):
+                motion.curves.append({first: step, last: step} if rest else plan_curve(
+                    courses[:, k], None if key else before[k], self.dictionary.kinds[k], trade=trade, reach=reach))
         code_motion(coder, models, self.dictionary.kinds, self.dictionary.frames, before, motion)
         ends = [curve[len(found) - 1] for curve in motion.curves] or before or [0] * len(self._steps)
         return coder.finish(), models, ends

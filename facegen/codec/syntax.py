@@ -23,7 +23,7 @@ _UNARY = 3                  # magnitudes told by yes or no; the rest is told by 
 _LONGEST = 17               # bits of the rest
 
 # Probability of "no" to begin with, by kind and then by context, counted on real and synthetic performances
-# (benchmarks/codec.py --count) and rounded; and how many answers that is worth.
+# (benchmarks/codec_rates.py --count) and rounded; and how many answers that is worth.
 _WORTH = 8
 _PRIORS: dict[str, tuple[tuple[float, ...], ...]] = {
     "short": ((0.95,),),
@@ -71,6 +71,7 @@ class Models:
         return other
 
     def __call__(self, question: str, kind: int = 0, context: int = 0) -> Model:
+        """Return the model of a question about a kind of parameter, in a context."""
         key = (question, kind, context)
         if key not in self._of:
             self._of[key] = Model(_PRIORS[question][kind][context], _WORTH)

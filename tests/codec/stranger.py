@@ -104,7 +104,8 @@ class Stream:
         flags, self.vocabulary, up, down, self.frames, k, way = struct.unpack(">BBHHBHB", data[:10])
         self.rate, self.bounded = up / down, bool(flags & 8)
         more = [kind for bit, kind, count in ((1, 2, 3), (2, 2, 3), (4, 3, 4)) if flags & bit for _ in range(count)]
-        codes, partners, rest = data[10:10 + k + len(more)], data[10 + k + len(more):][:k], data[10 + 2 * k + len(more):]
+        codes, rest = data[10:10 + k + len(more)], data[10 + k + len(more):]
+        partners, rest = rest[:k], rest[k:]
         self.steps = [64 * 2 ** (-code / 16) for code in codes]
         self.names = (rest.decode().split("\n") if k else []) if way == 0 else \
             [name for i, name in enumerate(arkit) if int.from_bytes(rest, "little") >> i & 1]

@@ -1,7 +1,7 @@
 """Bits against millimetres: parameter streams of real recordings, beside zlib on the same steps and MPEG-4's figure.
 
-    python benchmarks/codec.py              prints the tables of docs/codec.md; --write puts them there, with a chart
-    python benchmarks/codec.py --count      how often each question is answered "no": what the priors are rounded from
+    python benchmarks/codec_rates.py              prints the tables of docs/codec.md; --write puts them there, with a chart
+    python benchmarks/codec_rates.py --count      how often each question is answered "no": what the priors are rounded from
 
 Errors are distances between the skin's vertices of the base face (level 1), played from the recording and from the
 stream, over all vertices and all frames: movements of shapes are added, a turned head is taken to first order.
@@ -27,6 +27,7 @@ from facegen.animation.clip import Clip
 from facegen.animation.idle import Idle
 from facegen.blendshapes.recipes import shape_set
 from facegen.codec.packets import DICTIONARY, kind_of
+from facegen.codec.pairs import from_sums, to_sums
 from facegen.codec.rangecoder import Model
 from facegen.codec.recording import decode_packets, encode_performance, encoder_for, rows
 from facegen.codec.sampled import clip_performance
@@ -35,7 +36,7 @@ from facegen.face.motion import posed, shape_motion
 from facegen.facs.deformation import Deformation
 
 FPS = 25
-QUALITIES = (0.45, 0.9, 1.8, 3.6)
+QUALITIES = (0.4, 0.8, 1.6, 3.2)
 LENGTHS = ((1, 25), (4, 6), (8, 3), (16, 1), (16, 4), (32, 1))
 LOSSES = (0.0, 0.02, 0.05, 0.1, 0.2)
 UDP_IP = 28                 # bytes that UDP and IPv4 put before a packet
@@ -88,57 +89,75 @@ def bits(packets: Iterable[bytes], seconds: float) -> float:
     return 8 * sum(map(len, packets)) / seconds
 
 
-def zlib_bits(performance: Performance, quality: float, whole: bool) -> float:
-    """Return bits a second of the same steps, as differences from frame to frame, through zlib: all at once, or each
-    packet's frames by themselves."""
+def zlib_bits(performance: Performance, quality: float, whole: bool) -> tuple[float, float]:
+    """Return bits a second of every frame at the nearest steps, as differences from frame to frame, through zlib: all
+    at once, or each packet's frames by themselves; and its mean error, mm."""
     encoder = encoder_for(performance, quality=quality)
-    row = [encoder._row(one["weights"], {"head": None, "place": None, "gaze": None} | one)
-           for one in rows(performance, FPS)]
-    values = np.rint(encoder._filled(np.array(row)) / encoder._steps).astype(np.int16)
-    first = values[:1]
-    groups = [values] if whole else [values[at:at + 16] for at in range(0, len(values), 16)]
+    dictionary, steps = encoder.dictionary, np.array(encoder.dictionary.steps)
+    parts = [performance.weights]
+    if performance.head is not None:
+        parts.append(performance.head)
+    if performance.gaze is not None:
+        parts += [(performance.gaze[:, :2] + performance.gaze[:, 2:]) / 2,
+                  performance.gaze[:, :2] - performance.gaze[:, 2:]]
+    rows_ = to_sums(np.concatenate(parts, axis=1), dictionary.pairs)
+    for k, column in enumerate(rows_.T):
+        known = np.isfinite(column)
+        rows_[:, k] = np.interp(np.arange(len(rows_)), np.flatnonzero(known), column[known])
+    values = np.rint(rows_ / steps).astype(np.int16)
     size = 0
-    for group in groups:
-        change = np.diff(group, axis=0, prepend=0 * first)
+    for group in [values] if whole else [values[at:at + 16] for at in range(0, len(values), 16)]:
+        change = np.diff(group, axis=0, prepend=0 * group[:1])
         data = change.T.astype(np.int8 if abs(change).max() < 128 else np.int16).tobytes()
         size += len(zlib.compress(data, 9))
-    return 8 * size / (len(values) / FPS)
+    back = from_sums(values * steps, dictionary.pairs)
+    names = len(performance.names)
+    again = Performance(performance.times, performance.names, back[:, :names], performance.vocabulary,
+                        head=None if performance.head is None else back[:, names:names + 3])
+    return 8 * size / (len(values) / FPS), float(distances(performance, again).mean())
 
 
 def rate_table(found: dict[str, Performance]) -> list[str]:
     """Return the table of rate against error, and keep what the chart needs."""
-    lines = ["| performance | step, mm | bit/s, all | dictionary | mean error, mm | 99 % | max | in the head's frame, mean | "
-             "gaze, max degrees | zlib, all at once | zlib, by packet |", "|---|" + "---|" * 10]
+    columns = ("performance", "seconds", "step, mm", "bit/s", "dictionary, bytes", "mean error, mm", "99 %", "max",
+               "without the head: mean", "max", "gaze, largest, degrees", "zlib: bit/s", "mean error",
+               "zlib by packet: bit/s")
+    lines = [f"| {' | '.join(columns)} |", "|---|" + "---|" * (len(columns) - 1)]
     for name, one in found.items():
         seconds = len(one) / FPS
         for quality in QUALITIES:
             packets = encode_performance(one, quality=quality)
+            setup = [packet for packet in packets if kind_of(packet) == DICTIONARY]
+            rate = bits(packets, seconds) - bits(setup, seconds)
             again = decode_packets(packets)
             off, face = distances(one, again), distances(one, again, head=False)
             gaze = "" if one.gaze is None else f"{np.nanmax(abs(again.gaze - one.gaze)):.1f}"
-            setup = [packet for packet in packets if kind_of(packet) == DICTIONARY]
-            total, zipped, apart = bits(packets, seconds), zlib_bits(one, quality, True), zlib_bits(one, quality, False)
-            POINTS.setdefault(name, []).append((total, off.mean(), zipped))
-            lines.append(f"| {name} | {quality:g} | {total:.0f} | {bits(setup, seconds):.0f} | {off.mean():.2f} | "
-                         f"{np.percentile(off, 99):.1f} | {off.max():.1f} | {face.mean():.2f} | {gaze} | {zipped:.0f} | "
-                         f"{apart:.0f} |")
+            zipped, zipped_off = zlib_bits(one, quality, whole=True)
+            POINTS.setdefault(name, []).append((rate, off.mean(), zipped, zipped_off))
+            cells = (name, f"{seconds:.1f}", f"{quality:g}", f"{rate:.0f}", str(sum(map(len, setup))),
+                     f"{off.mean():.2f}", f"{np.percentile(off, 99):.1f}", f"{off.max():.1f}", f"{face.mean():.2f}",
+                     f"{face.max():.1f}", gaze, f"{zipped:.0f}", f"{zipped_off:.2f}",
+                     f"{zlib_bits(one, quality, whole=False)[0]:.0f}")
+            lines.append(f"| {' | '.join(cells)} |")
     return lines
 
 
-POINTS: dict[str, list[tuple[float, float, float]]] = {}
+POINTS: dict[str, list[tuple[float, float, float, float]]] = {}
 
 
 def delay_table(one: Performance) -> list[str]:
     """Return the table of delay against rate."""
     seconds = len(one) / FPS
-    lines = ["| frames a packet | key every | delay, s | bit/s, all | with UDP and IP | mean error, mm | encode, frames/s | "
-             "decode, frames/s |", "|---|" + "---|" * 7]
+    columns = ("frames a packet", "key every", "delay, s", "bit/s", "with UDP and IP", "mean error, mm",
+               "encode, frames/s", "decode, frames/s")
+    lines = [f"| {' | '.join(columns)} |", "|---|" + "---|" * (len(columns) - 1)]
     for frames, key_every in LENGTHS:
         start = time.perf_counter()
         packets = encode_performance(one, frames=frames, key_every=key_every)
         middle = time.perf_counter()
         again = decode_packets(packets)
         end = time.perf_counter()
+        packets = [packet for packet in packets if kind_of(packet) != DICTIONARY]
         lines.append(f"| {frames} | {key_every} | {frames / FPS:.2f} | {bits(packets, seconds):.0f} | "
                      f"{bits(packets, seconds) + 8 * UDP_IP * len(packets) / seconds:.0f} | "
                      f"{distances(one, again).mean():.2f} | {len(one) / (middle - start):.0f} | "
@@ -147,21 +166,19 @@ def delay_table(one: Performance) -> list[str]:
 
 
 def loss_table(one: Performance, rounds: int = 5) -> list[str]:
-    """Return the table of packets lost against error: packets in a random order too, some twice."""
+    """Return the table of packets lost against error."""
     settings = ((16, 1), (16, 4), (4, 6))
     lines = ["| packets lost | " + " | ".join(f"{frames} frames, key every {key}" for frames, key in settings) + " |",
              "|---|" + "---|" * len(settings)]
     for loss in LOSSES:
         cells = []
         for frames, key_every in settings:
-            packets, errors, shares = encode_performance(one, frames=frames, key_every=key_every), [], []
+            packets, errors = encode_performance(one, frames=frames, key_every=key_every), []
             for seed in range(rounds):
                 dice = random.Random(seed)
                 sent = [packet for packet in packets
                         if kind_of(packet) == DICTIONARY or dice.random() >= loss]
-                again = decode_packets(sent)
-                errors.append(distances(one, again).mean())
-                shares.append(len(again) / len(one))
+                errors.append(distances(one, decode_packets(sent)).mean())
             cells.append(f"{np.mean(errors):.2f} mm")
         lines.append(f"| {100 * loss:.0f} % | " + " | ".join(cells) + " |")
     return lines
@@ -179,13 +196,13 @@ def chart(path: Path) -> None:
     for k, (name, points) in enumerate(POINTS.items()):
         points = np.array(points)
         axes.plot(points[:, 0], points[:, 1], "o-", color=f"C{k}", label=name)
-        axes.plot(points[:, 2], points[:, 1], ":", color=f"C{k}", linewidth=1)
+        axes.plot(points[:, 2], points[:, 3], ":", color=f"C{k}", linewidth=1)
     axes.axhline(0.5, color="0.7", linewidth=1)
     axes.axvline(1000, color="0.7", linewidth=1)
     axes.axvline(2000, color="0.7", linewidth=1, linestyle="--")
     axes.text(2000, axes.get_ylim()[1], " MPEG-4 FAP", va="top", color="0.4")
-    axes.set(xscale="log", xlabel="bit/s, all (dotted: the same steps through zlib)", ylabel="mean error of the skin, mm",
-             xlim=(80, None), ylim=(0, None))
+    axes.set(xscale="log", xlabel="bit/s (dotted: every frame at the nearest step, the whole recording through zlib)",
+             ylabel="mean error of the skin, mm", xlim=(60, None), ylim=(0, None))
     axes.legend(fontsize="small")
     figure.tight_layout()
     figure.savefig(path, metadata={"Date": None})
@@ -230,7 +247,7 @@ def main() -> None:
         count(found)
         return
     tables = {"rate": rate_table(found), "delay": delay_table(found["facecap"]), "loss": loss_table(found["facecap"])}
-    tables["machine"] = [f"`python benchmarks/codec.py --write`, {time.strftime('%Y-%m-%d')}, {platform.machine()}, "
+    tables["machine"] = [f"`python benchmarks/codec_rates.py --write`, {time.strftime('%Y-%m-%d')}, {platform.machine()}, "
                          f"Python {platform.python_version()}, numpy {np.__version__}."]
     for lines in tables.values():
         print("\n".join(lines), end="\n\n", flush=True)
