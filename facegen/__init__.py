@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from facegen.animation.clip import Clip
     from facegen.animation.performance import Performance
+    from facegen.animation.playback import Playback
     from facegen.animation.script import load_clip, morph
     from facegen.animation.streams.files import load_performance, save_performance
     from facegen.blendshapes.recipes import Recipe, shape_set
@@ -42,6 +43,7 @@ if TYPE_CHECKING:
     from facegen.jobs.frames import save_clip, save_turn
     from facegen.jobs.rigging import rig
     from facegen.render import Renderer, Wireframe, render, render_passes, save_passes
+    from facegen.render.live import Live
     from facegen.transfer.rig import avatar_names
 
 __version__ = "0.1.0"
@@ -60,9 +62,11 @@ __all__ = [
     "FileError",
     "InputError",
     "JobError",
+    "Live",
     "Mesh",
     "NotationError",
     "Performance",
+    "Playback",
     "Recipe",
     "Renderer",
     "Resolution",
@@ -106,6 +110,7 @@ __all__ = [
 _HOMES = {
     "facegen.animation.clip": ("Clip",),
     "facegen.animation.performance": ("Performance",),
+    "facegen.animation.playback": ("Playback",),
     "facegen.animation.script": ("load_clip", "morph"),
     "facegen.animation.streams.files": ("load_performance", "save_performance"),
     "facegen.blendshapes.recipes": ("Recipe", "shape_set"),
@@ -128,6 +133,7 @@ _HOMES = {
     "facegen.jobs.batch": ("run_batch",),
     "facegen.jobs.frames": ("save_clip", "save_turn"),
     "facegen.jobs.rigging": ("rig",),
+    "facegen.render.live": ("Live",),
     "facegen.render.overlay": ("Wireframe",),
     "facegen.render.passes": ("render_passes",),
     "facegen.render.passfiles": ("save_passes",),

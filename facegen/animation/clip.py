@@ -28,7 +28,9 @@ from numpy.typing import NDArray
 from facegen.animation.easing import DEFAULT_EASE, EASES, eased
 from facegen.animation.idle import Idle
 from facegen.animation.motion import Timed
+from facegen.blendshapes.recipes import Recipe, shape_set
 from facegen.errors import InputError, nearest
+from facegen.face.avatar import AvatarFace
 from facegen.face.rig import Rig
 from facegen.facs.deformation import Deformation, weighted_sum
 from facegen.facs.expressions import Resolution, resolve
@@ -244,6 +246,28 @@ class Clip(Timed):
     def on(self, rig: Rig, *, detail: int = 2) -> Callable[[float], NDArray[np.float64]]:
         """Return what makes the vertices of a time, seconds."""
         return lambda t: rig.pose(self.at(t), detail=detail)
+
+    def weights_on(self, avatar: AvatarFace
+                   ) -> Callable[[float], tuple[NDArray[np.float64], NDArray[np.float64]]]:
+        """Return what makes the weights (s,) of an avatar's shapes at a time, and how its head turns (4,)."""
+        def at(t: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+            found = self.at(t)
+            weights = avatar.shape_weights(found)
+            return np.array([weights.get(name, 0.0) for name in avatar.shapes]), avatar.head_angles(found)
+
+        return at
+
+    def recipes(self, cues: Sequence[float]) -> dict[str, Recipe]:
+        """Return the units that move at some times, or all where raw data must be made of them."""
+        units = shape_set("units")
+        if self.raw:
+            return units
+        moving = {member for t in cues for member in load_units().coefficients(self.units_at(t))}
+        return {name: one for name, one in units.items() if set(one.members) & moving}
+
+    def key_times(self, fps: float) -> NDArray[np.float64]:
+        """Return the times of its frames."""
+        return np.array(self.times(fps))
 
     def check(self, rig: Rig) -> tuple[str, ...]:
         """Return what to warn of on a rig; InputError if raw data name what it has not."""

@@ -115,7 +115,7 @@ class _FaceDriver(Driver):
         zero = self.rig.linear_controls(Deformation(), strict=False)
         self._shapes = {one.name: getattr(zero, one.name).shape for one in fields(Controls)}
         parts = self.meaning.parts.values()
-        self._inputs = np.array([self._input(part) for part in parts]).reshape(len(parts), -1)
+        self._inputs = np.array([self._input(part) for part in parts]).reshape(len(parts), self._size)
         rows = self.rig.feature_points
         self._with_jaw = [[list(rows).index(name) for one in part.deformations for name in one.with_jaw if name in rows]
                           for part in parts]
@@ -163,6 +163,9 @@ class _AvatarDriver(Driver):
         places = {name: row for row, name in enumerate(rig.shapes)}
         own = {} if meaning.vocabulary == "units" else {
             name: shape for name in self.names if (shape := self._own(name)) is not None}
+        # What corrects another shape half way moves with that shape, on this rig as on the one that was recorded.
+        halves = {name for name in self.names if name in set(rig.notes.halves.values())}
+        own = {name: shape for name, shape in own.items() if name not in halves}
         self._refuse_if_nothing([*own, *meaning.shapes])
         self.own = own
         self.direct = np.array([name in own for name in self.names], bool)
@@ -174,7 +177,7 @@ class _AvatarDriver(Driver):
         self._head = np.array([self._turn(part) for part in meaning.parts.values()]).reshape(len(meaning.parts), 4)
         self._made = np.zeros((len(meaning.parts), len(places)))
         lost = self._make({name: part for name, part in meaning.parts.items() if name in needed and not part.turns})
-        self.unknown = tuple(name for name in meaning.unknown if name not in own)
+        self.unknown = tuple(name for name in meaning.unknown if name not in own and name not in halves)
         self.poor = tuple(name for name in self.names if name not in own
                           and any(lost.get(part, 0.0) > LOST for part in meaning.made_of[name]))
 

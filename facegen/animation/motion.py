@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import numbers
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from fractions import Fraction
 from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
+from facegen.blendshapes.recipes import Recipe
 from facegen.errors import InputError
+from facegen.face.avatar import AvatarFace
 from facegen.face.rig import Rig
 
 LOWEST_FPS, HIGHEST_FPS = 0.1, 1000.0
@@ -23,6 +25,12 @@ class Shown(Protocol):
 
     def on(self, rig: Rig, *, detail: int = 2) -> Callable[[Any], NDArray[np.float64]]:
         """Return what makes the vertices (n, 3) of ``rig.mesh(detail)`` of a cue; prepared once."""
+
+    def weights_on(self, avatar: AvatarFace) -> Callable[[Any], tuple[NDArray[np.float64], NDArray[np.float64]]]:
+        """Return what makes, of a cue, the weights (s,) of the avatar's shapes and how the head turns (4,)."""
+
+    def recipes(self, cues: Sequence[Any]) -> Mapping[str, Recipe]:
+        """Return the shapes that the parametric face needs to show some cues as blendshapes."""
 
 
 class Motion(Protocol):
@@ -41,6 +49,9 @@ class Motion(Protocol):
     @property
     def corners(self) -> tuple[float, ...]:
         """Times, seconds, at which it may reach farthest."""
+
+    def key_times(self, fps: float) -> NDArray[np.float64]:
+        """Return the times, seconds, that an animation of it has keys at, if ``fps`` of them a second are wanted."""
 
     def cue(self, t: float) -> Any:
         """Return what ``shown`` needs for a time; small, and pickled."""

@@ -12,7 +12,7 @@ the head and units 51 to 58. Where the head was in the room (``place``) is not s
 from __future__ import annotations
 
 import numbers
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
@@ -21,11 +21,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from facegen.animation.driver import GAZE, HEAD, Driver, limits, within
+from facegen.animation.driver import GAZE, HEAD, LOOKS, Driver, limits, within
 from facegen.animation.meaning import Meaning
 from facegen.animation.motion import Timed
 from facegen.animation.performance import Performance
+from facegen.blendshapes.recipes import Recipe, shape_set
 from facegen.errors import InputError
+from facegen.face.avatar import AvatarFace
 from facegen.face.rig import Rig
 from facegen.fileio.kept import content_key
 
@@ -36,8 +38,8 @@ BRIDGE = 0.5
 
 # The length of a single frame, seconds.
 _MOMENT = 1 / 25
-# Rounding of a weight that is 0 or 1.
-_ROUNDING = 1e-6
+# Rounding of a weight that is 0 or 1, and of degrees, by float32 and by turning them into rotations and back.
+_ROUNDING, _ROUNDING_OF_ANGLES = 1e-6, 1e-3
 
 
 class Cue(NamedTuple):
@@ -60,6 +62,27 @@ class Cast:
         """Return what makes the vertices (n, 3) of a cue."""
         driver = Driver(rig, self.vocabulary, self.names, detail=detail)
         return lambda cue: driver.vertices(*cue)
+
+    def weights_on(self, avatar: AvatarFace) -> Callable[[Cue], tuple[Array, Array]]:
+        """Return what makes, of a cue, the weights (s,) of an avatar's shapes and how its head turns (4,)."""
+        driver = Driver(avatar, self.vocabulary, self.names)
+        return lambda cue: driver.shape_weights(*cue)
+
+    def recipes(self, cues: Sequence[Cue]) -> dict[str, Recipe]:
+        """Return the shapes by their owner's names; of units those that move. ARKit's glances show the gaze."""
+        meaning = Meaning(self.vocabulary, self.names)
+        if self.vocabulary == "units":
+            amounts = np.array([meaning.coefficients(np.clip(cue.weights, 0.0, 1.0)) for cue in cues])
+            moving = {part for part, moves in zip(meaning.parts, amounts.any(axis=0), strict=True) if moves}
+            found = {name: one for name, one in shape_set("units").items() if set(one.members) & moving}
+        else:
+            known = shape_set("all" if self.vocabulary == "shapes" else self.vocabulary)
+            wanted = set(meaning.shapes.values())
+            wanted |= {corrected for shape in wanted if (corrected := known[shape].minus) is not None}
+            found = {shape: one for shape, one in known.items() if shape in wanted}
+        if any(cue.gaze is not None for cue in cues):
+            found |= {name: shape_set("arkit")[name] for name in LOOKS if name not in found}
+        return found
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,6 +144,10 @@ class Playback(Timed):
         parts = [one for one in self.filled if one is not None]
         return Cast(self.performance.vocabulary, self.performance.names, content_key("playback", self.moments, *parts))
 
+    def key_times(self, fps: float) -> Array:
+        """Return the times of its own frames."""
+        return self.moments
+
     def cue(self, t: float) -> Cue:
         """Return the moment at a time in seconds; before the first frame and after the last it holds."""
         after = int(np.clip(np.searchsorted(self.moments, t, side="right"), 1, max(len(self.moments) - 1, 1)))
@@ -166,13 +193,13 @@ class Playback(Timed):
     def _beyond(self, part: str, axes: tuple[str, ...], angles: Array | None) -> tuple[str, ...]:
         if angles is None:
             return ()
-        frames = (np.abs(angles - within(part, angles)) > _ROUNDING).any(axis=1)
+        frames = (np.abs(angles - within(part, angles)) > _ROUNDING_OF_ANGLES).any(axis=1)
         if not frames.any():
             return ()
         low, high = limits(part)
         least, most = angles.min(axis=0), angles.max(axis=0)
         which = [f"{axis} {least[i]:.0f}..{most[i]:.0f} of {low[i]:g}..{high[i]:g}" for i, axis in enumerate(axes)
-                 if least[i] < low[i] - _ROUNDING or most[i] > high[i] + _ROUNDING]
+                 if least[i] < low[i] - _ROUNDING_OF_ANGLES or most[i] > high[i] + _ROUNDING_OF_ANGLES]
         return (f"the {part} turn{'s' if part == 'head' else ''} beyond reach in {int(frames.sum())} frames "
                 f"({', '.join(which)} degrees); they are clipped",)
 

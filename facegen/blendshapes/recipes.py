@@ -17,7 +17,7 @@ from facegen.blendshapes.names import shape_of
 from facegen.data import tables_dir
 from facegen.errors import FacegenError, InputError, TableError, nearest
 from facegen.facs.deformation import Deformation, deformation_from_entry, weighted_sum
-from facegen.facs.expression_table import Person, load_expressions, load_person
+from facegen.facs.expression_table import Expression, Person, load_expressions, load_person
 from facegen.facs.notation import canonical, parse
 from facegen.facs.rules import symmetric
 from facegen.facs.tables import load_units
@@ -121,11 +121,17 @@ def _units() -> Mapping[str, Recipe]:
 
 
 def _expressions(person: str | Path | Person | None) -> dict[str, Recipe]:
-    found = dict(load_expressions().expressions)
-    if person is not None:
-        found |= load_person(person).expressions
+    return dict(_common()) if person is None else {**_common(), **_made(load_person(person).expressions)}
+
+
+@cache
+def _common() -> Mapping[str, Recipe]:
+    return _made(load_expressions().expressions)
+
+
+def _made(expressions: Mapping[str, Expression]) -> dict[str, Recipe]:
     table, made = load_units(), {}
-    for name, one in found.items():
+    for name, one in expressions.items():
         members = {member: value for member, value in table.coefficients(one.units).items() if not is_head(member)}
         made[name] = Recipe((_sum(members),), None, members, canonical(one.units), "expressions", one.about, one.source)
     return made

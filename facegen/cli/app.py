@@ -11,7 +11,7 @@ from typing import Annotated
 import typer
 
 from facegen import __version__
-from facegen.cli import batch, convert, explain, figures, film, gallery, listing, picture
+from facegen.cli import batch, convert, explain, figures, film, gallery, listing, picture, play
 from facegen.cli import rig as rigging
 from facegen.cli import stream as streaming
 from facegen.errors import FacegenError, InputError
@@ -33,6 +33,7 @@ app.command("figures")(figures.figures)
 app.command("animate")(film.animate)
 app.command("morph")(film.morph)
 app.command("turntable")(film.turntable)
+app.command("play")(play.play)
 app.command("rig")(rigging.rig)
 app.command("convert")(convert.convert)
 app.command("encode")(streaming.encode)

@@ -45,31 +45,46 @@ def convert(recording: Recording, output: Out = None, source: Source = None, tar
     """Write a recording in another format, cleaned up if you like.
 
     For example: facegen convert openface.csv -o take.csv --to livelink --calibrate 0-2 --smooth on
-    What a conversion between vocabularies loses is said.
+    What a conversion between vocabularies loses is said. A .glb becomes the base face with the shapes and their
+    animation; facegen play takes any other face.
     """
     if output is None:
         raise InputError("-o: say where it goes, for example -o take.json")
     from facegen.animation.streams import resampled, save_performance, translated
+    from facegen.fileio.avatar import ANIMATED
 
+    animated = target is None and output.suffix.lower() in ANIMATED
     if target is not None:                              # before long work
         _format(output, target)
     read = read_recording(recording, source=source, fps=fps, face_id=face_id, presence=presence, calibrate=calibrate,
                           calibrate_head=calibrate_head, gain=gain, smooth=smooth, quiet=quiet)
-    kind = _format(output, target, read)
+    kind = "gltf" if animated else _format(output, target, read).name
     made = read
     if resample is not None:
         made = _option(resampled, made, resample)
     if vocabulary is not None:
         made = _option(translated, made, vocabulary)
-    written = save_performance(made, output, kind.name)
+    written = _animated(made, output) if animated else save_performance(made, output, kind)
     new = [warning for warning in written.warnings if warning not in read.warnings]
     if not quiet:
         warn(new)
     if json:
-        print_json({"file": str(output), "format": kind.name, "from": read.about.get("format"),
+        print_json({"file": str(output), "format": kind, "from": read.about.get("format"),
                     "vocabulary": written.vocabulary, "frames": len(written), "found": int(written.found.sum()),
                     "duration": written.duration, "rate": written.rate, "names": list(written.names),
                     "residual": float(written.about.get("residual", 0.0)), "warnings": list(written.warnings)})
+
+
+def _animated(one: Performance, output: Path) -> Performance:
+    """Write a performance as an animation of the base face, and return it with what that changes."""
+    from dataclasses import replace
+
+    from facegen.animation.playback import Playback
+    from facegen.jobs.animated import save_animation
+
+    play = Playback(one)
+    made = save_animation(play, output)
+    return replace(one, warnings=tuple(dict.fromkeys((*play.warnings, *made.warnings))))
 
 
 def _format(output: Path, target: str | None, read: Performance | None = None) -> Format:

@@ -30,12 +30,13 @@ from facegen.errors import InputError
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from facegen.animation.clip import Clip
+    from facegen.animation.motion import Motion
     from facegen.jobs.runner import Report
 
 Out = Annotated[Path | None, typer.Option(
     "--output", "-o", metavar="OUT", help="Where the film goes: .mp4, .webm, .gif, .webp or .apng; a name without "
-                                          "suffix is a folder of numbered pictures. [required]")]
+                                          "suffix is a folder of numbered pictures; .glb is an animation of "
+                                          "blendshapes. [required]")]
 Rate = Annotated[float, typer.Option("--fps", metavar="N", help="Frames a second.")]
 Workers = Annotated[int | None, typer.Option(
     "--workers", min=1, metavar="N", help="Processes that draw; one for each core by default.")]
@@ -55,12 +56,12 @@ def animate(script: Annotated[Path, typer.Argument(metavar="SCRIPT", help="A cli
     For example: facegen animate greeting.yaml -o greeting.mp4. A stopped run goes on where it was when the same
     command is given again.
     """
-    out = _target(output)
+    out = target(output)
     from facegen.animation.script import load_clip
 
     clip = load_clip(script, person=person, idle=idle)
-    _film(clip, out, fps=fps, size=size, view=view, renderer=renderer, face=face, background=background, detail=detail,
-          workers=workers, json=json, quiet=quiet, about={"script": str(script), "person": person})
+    film(clip, out, fps=fps, size=size, view=view, renderer=renderer, face=face, background=background, detail=detail,
+         workers=workers, json=json, quiet=quiet, about={"script": str(script), "person": person})
 
 
 def morph(poses: Annotated[list[str], typer.Argument(
@@ -77,13 +78,13 @@ def morph(poses: Annotated[list[str], typer.Argument(
 
     For example: facegen morph happiness anger -o morph.gif
     """
-    out = _target(output)
+    out = target(output)
     from facegen.animation.script import morph as between
 
     found = [read_what(pose, person=person, intensity=1.0, quiet=True) for pose in poses]
     clip = between(*found, seconds=seconds, hold=hold, back=back, ease=ease, idle=idle)
-    _film(clip, out, fps=fps, size=size, view=view, renderer=renderer, face=face, background=background, detail=detail,
-          workers=workers, json=json, quiet=quiet, about={"poses": poses, "person": person})
+    film(clip, out, fps=fps, size=size, view=view, renderer=renderer, face=face, background=background, detail=detail,
+         workers=workers, json=json, quiet=quiet, about={"poses": poses, "person": person})
 
 
 def turntable(what: What, output: Out = None, seconds: Seconds = 4.0,
@@ -99,7 +100,7 @@ def turntable(what: What, output: Out = None, seconds: Seconds = 4.0,
 
     For example: facegen turntable happiness -o turn.webp
     """
-    out = _target(output)
+    out = target(output)
     yaws = _yaws(turn)
     pixels, ground = read_size(size), read_background(background)
     meaning = read_what(what, person=person, intensity=intensity, quiet=quiet, face=face)
@@ -115,22 +116,43 @@ def turntable(what: What, output: Out = None, seconds: Seconds = 4.0,
                     "size": list(pixels), "face": face, "made": report.made, "kept": report.kept})
 
 
-def _film(clip: Clip, out: Path, *, fps: float, size: str, view: str, renderer: str, face: str, background: str,
-          detail: int | None, workers: int | None, json: bool, quiet: bool, about: dict[str, Any]) -> None:
-    """Draw a clip with a progress bar, and tell of it."""
+def film(clip: Motion, out: Path, *, fps: float, size: str, view: str, renderer: str, face: str, background: str,
+         detail: int | None, workers: int | None, json: bool, quiet: bool, about: dict[str, Any]) -> None:
+    """Draw a clip or a recording with a progress bar, or write it as an animation of blendshapes, and tell of it."""
     angles, pixels, ground = read_view(view), read_size(size), read_background(background)
     count = clip.frames(fps)
+    from facegen.fileio.avatar import ANIMATED
+
+    if out.suffix.lower() in ANIMATED:
+        _animation(clip, out, fps=fps, face=face, detail=detail, json=json, quiet=quiet, about=about)
+        return
+    from facegen.face.face import load_face
     from facegen.jobs.frames import save_clip
 
+    warnings = [*clip.warnings, *clip.check(load_face(face))]
     if not quiet:
-        warn(clip.warnings)
+        warn(warnings)
     report = _drawn(count, quiet, lambda step: save_clip(
         clip, out, fps=fps, size=pixels, view=angles, face=face, detail=detail, background=ground, renderer=renderer,
         workers=_count(workers), step=step))
     if json:
         print_json({"file": str(out), **about, "duration": clip.duration, "fps": fps, "frames": count,
                     "size": list(pixels), "view": list(angles), "face": face, "made": report.made,
-                    "kept": report.kept, "warnings": list(clip.warnings)})
+                    "kept": report.kept, "warnings": warnings})
+
+
+def _animation(clip: Motion, out: Path, *, fps: float, face: str, detail: int | None, json: bool, quiet: bool,
+               about: dict[str, Any]) -> None:
+    """Write an animation into a glTF file, and tell of it."""
+    from facegen.jobs.animated import save_animation
+
+    made = save_animation(clip, out, face=face, fps=fps, detail=detail)
+    warnings = [*clip.warnings, *made.warnings]
+    if not quiet:
+        warn(warnings)
+    if json:
+        print_json({"file": str(made.path), **about, "duration": clip.duration, "face": face, "keys": made.keys,
+                    "shapes": list(made.names), "warnings": warnings})
 
 
 def _drawn(count: int, quiet: bool, draw: Callable[[Callable[[], None]], Report]) -> Report:
@@ -138,7 +160,8 @@ def _drawn(count: int, quiet: bool, draw: Callable[[Callable[[], None]], Report]
         return draw(step)
 
 
-def _target(output: Path | None) -> Path:
+def target(output: Path | None) -> Path:
+    """Return where a film goes; InputError without one."""
     if output is None:
         raise InputError("-o: say where the film goes, for example -o film.mp4")
     return output

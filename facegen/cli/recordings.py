@@ -15,13 +15,14 @@ if TYPE_CHECKING:
 
 Recording = Annotated[Path, typer.Argument(
     metavar="FILE", help="A recording: CSV or JSON of OpenFace, py-feat, LibreFace, Live Link Face, MediaPipe, or our "
-                         "own. `facegen list formats` names all.")]
+                         "own, or a .glb with an animation. `facegen list formats` names all.")]
 Source = Annotated[str | None, typer.Option(
     "--from", metavar="FORMAT", help="What the recording is; by default the content says it.")]
 RecordedRate = Annotated[float | None, typer.Option(
     "--fps", metavar="N", help="Frames a second of a recording whose file has no times, such as py-feat's.")]
 FaceId = Annotated[str | None, typer.Option(
-    "--id", metavar="ID", help="Which face, where several were recorded; by default the one that is there longest.")]
+    "--id", metavar="ID", help="Which face, where several were recorded; by default the one that is there longest. Of "
+                               "a .glb: which animation, by name or number.")]
 Presence = Annotated[float | None, typer.Option(
     "--presence", metavar="0..1", help="The weight of a unit that is only called present, such as OpenFace's AU28_c.")]
 Calibrate = Annotated[str | None, typer.Option(
@@ -35,14 +36,18 @@ Smooth = Annotated[str | None, typer.Option(
     "--smooth", metavar="HOW", help="Take the jitter off (One Euro filter): on, or CUTOFF or CUTOFF,BETA in Hz.")]
 
 # What the arguments of `load_performance` are called on the command line.
-_OPTIONS = {"format": "--from", "fps": "--fps", "person": "--id", "presence": "--presence", "calibrate": "--calibrate",
+_OPTIONS = {"format": "--from", "person": "--id", "presence": "--presence", "calibrate": "--calibrate",
             "gain": "--gain", "smooth": "--smooth"}
 
 
 def read_recording(path: Path, *, source: str | None = None, fps: float | None = None, face_id: str | None = None,
                    presence: float | None = None, calibrate: str | None = None, calibrate_head: bool = False,
-                   gain: str | None = None, smooth: str | None = None, quiet: bool = False) -> Performance:
-    """Return the performance of a recording as a command's options ask for it; warnings go to stderr."""
+                   gain: str | None = None, smooth: str | None = None, quiet: bool = False,
+                   rate: str = "--fps") -> Performance:
+    """Return the performance of a recording as a command's options ask for it; warnings go to stderr.
+
+    rate: what the command calls ``fps``, to be named in errors.
+    """
     from facegen.animation.streams import load_performance
     from facegen.animation.streams.calibrate import Calibration, parse_calibration
 
@@ -57,22 +62,23 @@ def read_recording(path: Path, *, source: str | None = None, fps: float | None =
         performance = load_performance(path, format=source, fps=fps, person=face_id, presence=presence, calibrate=how,
                                        smooth=smooth)
     except FileError as error:
-        raise FileError(str(error).replace("(fps)", "(--fps)").replace("say which format", "say which (--from)")
+        raise FileError(str(error).replace("(fps)", f"({rate})").replace("say which format", "say which (--from)")
                         ) from error
     except InputError as error:
-        raise _named(error) from error
+        raise _named(error, rate) from error
     if not quiet:
         warn(performance.warnings)
     return performance
 
 
-def _named(error: InputError) -> InputError:
+def _named(error: InputError, rate: str) -> InputError:
     """Return an error that names the option instead of the argument."""
     name, colon, rest = str(error).partition(":")
     inner, _, more = rest.strip().partition(":")
     if name == "calibrate" and inner == "gain":
         name, rest = inner, f" {more.strip()}"
-    return InputError(f"{_OPTIONS[name]}:{rest}") if colon and name in _OPTIONS else error
+    options = {**_OPTIONS, "fps": rate, "animation": "--id"}
+    return InputError(f"{options[name]}:{rest}") if colon and name in options else error
 
 
 def _gain(text: str | None) -> float | dict[str, float]:

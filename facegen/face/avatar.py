@@ -82,6 +82,11 @@ class AvatarFace:
 
     # -- what there is ------------------------------------------------------------------------------------------
     @property
+    def file(self) -> AvatarFile:
+        """The file it was made of."""
+        return self._file
+
+    @property
     def shapes(self) -> tuple[str, ...]:
         """Names of all blendshapes in the file."""
         return tuple(self._file.shapes)

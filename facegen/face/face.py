@@ -140,6 +140,15 @@ class Face:
         """Names of the corrective folds."""
         return tuple(self._data.folds)
 
+    @property
+    def neck(self) -> Array:
+        """Where the head turns (3,), mm."""
+        return self._data.head_pivot
+
+    def neck_weight(self, detail: int = 2) -> Array:
+        """Return how much of the head's turn each vertex (n, 1) of ``mesh(detail)`` makes."""
+        return self._level(detail).head_weight
+
     def mesh(self, detail: int = 2) -> Mesh:
         """Return the neutral face at a subdivision level, 0 (the cage's own triangles) to 3."""
         return self._level(detail).mesh

@@ -16,7 +16,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from facegen.errors import FileError, InputError, nearest
-from facegen.fileio.gltf_file import glb_bytes, gltf_bytes
+from facegen.fileio.gltf_animate import Keys, with_animation
+from facegen.fileio.gltf_file import GltfFile, glb_bytes, gltf_bytes
+from facegen.fileio.gltf_neck import Neck
 from facegen.fileio.gltf_new import new_file
 from facegen.fileio.gltf_read import GltfScene, read_scene, scene_of
 from facegen.fileio.gltf_write import foreign_names, name_taken, with_targets
@@ -30,6 +32,7 @@ from facegen.geometry.mesh import Mesh
 
 READABLE = (".obj", ".glb", ".gltf", ".vrm", ".ply", ".stl")
 WRITABLE = (".glb", ".vrm", ".gltf", ".npz")
+ANIMATED = (".glb", ".vrm", ".gltf")
 _EMPTY: Mapping[str, Any] = MappingProxyType({})
 
 
@@ -113,7 +116,38 @@ def save_avatar(avatar: AvatarFile, path: str | os.PathLike[str], shapes: Mappin
         shapes = {name: shape[rows] for name, shape in shapes.items()}
     found, data = with_targets(scene, shapes, notes=notes, normals=normals, quantise=quantise,
                                expressions=expressions)
-    pieces = gltf_bytes(found, data) if suffix == ".gltf" else glb_bytes(found, data, scene.file.rest)
+    return _save_gltf(path, found, data, scene.file.rest)
+
+
+def with_shapes(avatar: AvatarFile, shapes: Mapping[str, ArrayLike], *, notes: Mapping[str, Any] = _EMPTY
+                ) -> tuple[AvatarFile, NDArray[np.int64]]:
+    """Return what `load_avatar` would read of a GLB file that `save_avatar` wrote of a mesh that is none, without
+    writing it, and which vertex of the mesh each of its vertices is."""
+    shapes = _checked(avatar, shapes)
+    scene, rows = _as_scene(avatar, shapes, quantise=False)
+    found, data = with_targets(scene, {name: shape[rows] for name, shape in shapes.items()}, notes=_plain(notes),
+                               normals=True, quantise=False, expressions={})
+    scene = scene_of(GltfFile(avatar.path, "glb", found, (data,), b"", ""))
+    return AvatarFile(avatar.path, "glb", scene.mesh, scene.colours, scene.vertex_colours, scene.shapes, scene.notes,
+                      "", scene), rows
+
+
+def save_animated(avatar: AvatarFile, path: str | os.PathLike[str], keys: Keys, *, neck: Neck | None = None
+                  ) -> tuple[Path, bool]:
+    """Write a glTF avatar with an animation of its shapes; return the path, and whether the head turns in it.
+
+    path: .glb, .vrm or .gltf. Everything that was in the file stays, other animations too. neck: where the head turns,
+    for a file that has no joint for it. Raises FileError for the path, InputError for an avatar that is no glTF file.
+    """
+    path = check_place(path, ANIMATED)
+    if not isinstance(avatar.source, GltfScene):
+        raise InputError(f"avatar: expected a glTF file (.glb, .gltf, .vrm), got {avatar.path}")
+    found, data, turned = with_animation(avatar.source, keys, neck)
+    return _save_gltf(path, found, data, avatar.source.file.rest), turned
+
+
+def _save_gltf(path: Path, found: dict[str, Any], data: bytes, rest: bytes) -> Path:
+    pieces = gltf_bytes(found, data) if path.suffix.lower() == ".gltf" else glb_bytes(found, data, rest)
     with whole_file(path, "the avatar ") as draft, open(draft, "wb") as file:
         file.writelines(pieces)
     return path

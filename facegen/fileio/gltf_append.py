@@ -15,8 +15,11 @@ from facegen.errors import FileError
 from facegen.fileio.gltf_file import GltfFile, read_uri
 from facegen.fileio.jsontree import Tree
 
-_FLOAT, _SHORT, _U16, _U32 = 5126, 5122, 5123, 5125
+_FLOAT, _BYTE, _SHORT, _U16, _U32 = 5126, 5121, 5122, 5123, 5125
 _ARRAY_BUFFER = 34962
+_OF_VERTICES = " of vertices"
+# Bytes from one vertex to the next, by the kind of what is kept of them.
+_STEPS = {f"VEC3{_OF_VERTICES}": 12, f"VEC4{_OF_VERTICES}": 16, f"joints{_OF_VERTICES}": 4}
 STEPS = 32767                                       # of a normalised short between 0 and 1
 _IMAGE_TYPES = {b"\x89PNG": "image/png", b"\xff\xd8\xff": "image/jpeg", b"RIFF": "image/webp",
                 b"\xabKTX": "image/ktx2"}
@@ -105,9 +108,14 @@ class Appended:
     def floats(self, values: NDArray, kind: str, *, bounds: bool = False, vertex: bool = False) -> int:
         """Add an accessor of packed float32 values (n, width) or (n,) and return its index."""
         values = np.ascontiguousarray(values, dtype="<f4")
-        where = self._part(f"{kind} of vertices" if vertex else kind, values.tobytes())
+        where = self._part(f"{kind}{_OF_VERTICES}" if vertex else kind, values.tobytes())
         return self.accessor({**where, "componentType": _FLOAT, "count": len(values), "type": kind,
                               **(_bounds(values) if bounds else {})})
+
+    def joints(self, values: NDArray) -> int:
+        """Add an accessor of the joints (n, 4), each below 256, that move vertices and return its index."""
+        where = self._part(f"joints{_OF_VERTICES}", np.ascontiguousarray(values, dtype="u1").tobytes())
+        return self.accessor({**where, "componentType": _BYTE, "count": len(values), "type": "VEC4"})
 
     def indices(self, faces: NDArray, count: int) -> int:
         """Add the corners of triangles (m, 3) of ``count`` vertices and return the accessor's index."""
@@ -148,7 +156,7 @@ class Appended:
     def finished(self) -> tuple[dict[str, Any], bytes]:
         """Return the JSON and the one buffer."""
         for kind, (view, pieces, size) in self._kinds.items():
-            more = {"byteStride": 12, "target": _ARRAY_BUFFER} if kind.endswith("of vertices") else {}
+            more = {"byteStride": _STEPS[kind], "target": _ARRAY_BUFFER} if kind in _STEPS else {}
             if kind == "corners":
                 more = {"target": _ARRAY_BUFFER + 1}
             self.json["bufferViews"][view] = self._view(self._push(b"".join(pieces)), size, **more)

@@ -84,6 +84,11 @@ def target_names(mesh: Tree, primitive: Tree, part: str) -> list[str]:
     return list(names)
 
 
+def part_name(node: Tree, mesh: Tree, number: int) -> str:
+    """Return what the part is called that a node shows: the node's name, or the mesh's."""
+    return _name(node) or _name(mesh) or f"node {number}"
+
+
 def triangles(primitive: Tree, accessors: Accessors, count: int) -> NDArray[np.int64]:
     """Return a primitive's triangles (m, 3); none if it is made of points or lines."""
     mode = primitive["mode"].integer(0, _FAN) if primitive.get("mode") else _TRIANGLES
@@ -159,7 +164,7 @@ class _Reader:
     def _add_node(self, number: int) -> None:
         node = self.scene.nodes[number]
         mesh = self.meshes[node["mesh"].index(len(self.meshes), "mesh")]
-        part = _name(node) or _name(mesh) or f"node {number}"
+        part = part_name(node, mesh, number)
         part = part if part not in self.parts else f"{part}#{number}"
         joints = None
         if node.get("skin"):

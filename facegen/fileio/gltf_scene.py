@@ -101,10 +101,16 @@ def _turned(tree: Tree) -> NDArray[np.float64]:
     if length < _NO_TURN:
         raise tree.error("a rotation of length zero")
     quaternion /= length                            # first, so that squares stay finite
-    x, y, z, w = quaternion / np.sqrt(quaternion @ quaternion)
-    return np.array([[1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
-                     [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
-                     [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)]])
+    return rotations(quaternion / np.sqrt(quaternion @ quaternion))
+
+
+def rotations(quaternions: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the rotation matrices (..., 3, 3) of unit quaternions (..., 4) as x, y, z, w."""
+    x, y, z, w = np.moveaxis(quaternions, -1, 0)
+    rows = [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w),
+            2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w),
+            2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)]
+    return np.stack(rows, axis=-1).reshape(*x.shape, 3, 3)
 
 
 def joint_matrices(tree: Tree, skin: Tree, world: NDArray[np.float64], accessors: Accessors) -> NDArray[np.float64]:

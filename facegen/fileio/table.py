@@ -13,7 +13,7 @@ import math
 import re
 from array import array
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -78,6 +78,11 @@ class Table:
 def fold(name: str) -> str:
     """Return a column's name without spaces and capitals."""
     return re.sub(r"\s+", "", name).casefold()
+
+
+def are_numbers(names: Sequence[str]) -> bool:
+    """Return whether most of what should be names are numbers: a header that is missing."""
+    return 2 * sum(_number(name, ";") is not None for name in names) > len(names)
 
 
 def shown(text: str) -> str:
@@ -164,7 +169,7 @@ class _Reader:
         names = _names(text)
         if len(names) > MOST_COLUMNS:
             raise FileError(f"{self.path}: line {line}: {len(names):,} columns; expected at most {MOST_COLUMNS:,}")
-        if sum(_number(name, self.delimiter) is not None for name in names) * 2 > len(names):
+        if are_numbers(names):
             raise FileError(f"{self.path}: line {line}: expected the names of the columns, got numbers "
                             f"({shown(text.strip())}): put the header back on top")
         if len(names) > 1 and not names[-1]:

@@ -32,10 +32,12 @@ from facegen.face.rig import Rig
 from facegen.facs.deformation import Deformation
 from facegen.facs.expressions import Resolution, resolve
 from facegen.facs.yamlfile import read_data
+from facegen.fileio.avatar import ANIMATED
 from facegen.fileio.images import without_full_alpha, write_whole
 from facegen.fileio.textfile import make_folder, save_text
 from facegen.fileio.video import FORMATS, check_film, save_video
 from facegen.geometry.camera import Camera, check_view, frame
+from facegen.jobs.animated import save_animation
 from facegen.jobs.digests import digest_of, face_digest, file_digest
 from facegen.jobs.runner import Report, run, shared
 from facegen.render.backends import choose, warm
@@ -113,9 +115,11 @@ def save_clip(clip: Motion | Performance, path: str | os.PathLike[str], *, fps: 
     """Draw a clip, or a recording, into a film or into a folder of numbered pictures, and say what was done.
 
     clip: a `Clip`, a `Performance`, or a `Playback` of one. path: .mp4, .webm, .gif, .webp, .apng or .png; a name
-    without suffix is a folder that gets ``frame_00001.png`` and so on. face: a face's name or path. workers: processes
-    that draw; in a script, more than 1 needs the usual ``if __name__ == "__main__":``. step: called once a frame. The
-    rest is as for `Renderer`; the camera stands still and shows all that the clip reaches.
+    without suffix is a folder that gets ``frame_00001.png`` and so on; .glb, .gltf or .vrm becomes an animation of
+    blendshapes, see `facegen.jobs.animated.save_animation`, for which the camera's options do not count. face: a face's
+    name or path. workers: processes that draw; in a script, more than 1 needs the usual
+    ``if __name__ == "__main__":``. step: called once a frame. The rest is as for `Renderer`; the camera stands still
+    and shows all that the clip reaches.
 
     The same call after a stop goes on where it stopped. Raises InputError, or FileError for the path, before work
     starts. ::
@@ -125,6 +129,8 @@ def save_clip(clip: Motion | Performance, path: str | os.PathLike[str], *, fps: 
     size, view = check_size(size), check_view(view)
     clip = as_motion(clip)
     count = clip.frames(fps)
+    if Path(path).suffix.lower() in ANIMATED:
+        return Report(save_animation(clip, path, face=face, fps=fps, detail=detail).keys, 0)
     rig, name, mesh, level, chosen = _prepared(face, size, view, detail, background, renderer, count)
     clip.check(rig)                     # a point that this face lacks is said now
     target = _Target(Path(path), size, fps)

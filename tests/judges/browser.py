@@ -6,6 +6,7 @@ import json
 import shutil
 import subprocess
 import threading
+from collections.abc import Sequence
 from functools import partial
 from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
@@ -23,8 +24,11 @@ def chromium() -> str | None:
     return next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
 
 
-def seen_by_threejs(judges: Path, avatar: Path, poses: list[str], profile: Path) -> dict:
-    """Return what three.js finds in a GLB: its meshes, and a picture (data: URI) of each pose and of the neutral ''."""
+def seen_by_threejs(judges: Path, avatar: Path, poses: list[str], profile: Path, times: Sequence[float] = ()) -> dict:
+    """Return what three.js finds in a GLB: its meshes, and a picture (data: URI) of each pose and of the neutral ''.
+
+    times: seconds at which its last animation is looked at.
+    """
     found: dict = {}
     done = threading.Event()
 
@@ -35,7 +39,7 @@ def seen_by_threejs(judges: Path, avatar: Path, poses: list[str], profile: Path)
         def do_GET(self):
             files = {"/": HERE / "page.html", "/avatar.glb": avatar}
             if self.path == "/wish":
-                self._say(json.dumps({"poses": poses}).encode(), "application/json")
+                self._say(json.dumps({"poses": poses, "times": list(times)}).encode(), "application/json")
             elif self.path in files:
                 self._say(files[self.path].read_bytes(), "text/html" if self.path == "/" else "model/gltf-binary")
             else:

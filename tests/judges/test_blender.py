@@ -12,6 +12,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 from rigged import rows_of, written
+from scipy.spatial import cKDTree
+
+import facegen
+from facegen.animation.playback import Playback
+from facegen.jobs.animated import save_animation
 
 PYTHON = os.environ.get("FACEGEN_BPY") or (sys.executable if importlib.util.find_spec("bpy") else None)
 
@@ -22,10 +27,10 @@ pytestmark = pytest.mark.skipif(PYTHON is None,
 TURN = np.array([[1, 0, 0], [0, 0, -1], [0, 1, 0]])
 
 
-def seen_by_blender(path):
-    """Return what blender_look.py finds in a file."""
-    done = subprocess.run([PYTHON, str(Path(__file__).with_name("blender_look.py")), str(path)], capture_output=True,
-                          text=True, timeout=300, check=False)
+def seen_by_blender(path, *times):
+    """Return what blender_look.py finds in a file, or in its animation at some times in seconds."""
+    done = subprocess.run([PYTHON, str(Path(__file__).with_name("blender_look.py")), str(path), *map(str, times)],
+                          capture_output=True, text=True, timeout=300, check=False)
     assert done.returncode == 0, done.stdout + done.stderr
     return json.loads(next(line for line in done.stdout.splitlines() if line.startswith("FOUND"))[6:])
 
@@ -66,3 +71,24 @@ def test_a_shipped_avatar_that_facegen_rigged(cartoon):
             met[name] = max(met[name], np.abs(delta).max())
     for name, shape in shapes.items():
         assert met[name] == pytest.approx(np.abs(shape).max(), abs=2e-6 * size)
+
+
+def test_an_animation(tmp_path, cartoon):
+    times = (0.25, 0.5, 0.75)
+    take = Playback(facegen.Performance(np.arange(5) / 4, ("jawOpen", "eyeBlinkLeft"), np.array(
+        [[0, 0], [0.5, 1], [1, 0.25], [0.3, 0], [0, 0]]), "arkit", head=np.outer(np.arange(5), [6.0, 3.0, -2.0])))
+    path = save_animation(take, tmp_path / "take.glb", face=cartoon[0]).path
+    found, avatar = seen_by_blender(path, *times), facegen.load_face(path)
+    pose = take.shown.on(facegen.load_face(cartoon[0]))
+    size = np.ptp(avatar.mesh().vertices, axis=0).max()
+    for t, moment in zip(times, found, strict=True):
+        vertices = pose(take.cue(t))
+        met = set()
+        for one in moment.values():
+            for k, name in enumerate(take.performance.names):
+                if name in one["values"]:
+                    assert one["values"][name] == pytest.approx(take.cue(t).weights[k], abs=1e-5)
+                    met.add(name)
+            places = avatar.notes.apply(np.array(one["places"]) @ TURN)
+            assert cKDTree(vertices).query(places)[0].max() < 2e-5 * size
+        assert met == {"jawOpen", "eyeBlinkLeft"}

@@ -9,6 +9,7 @@ from pathlib import Path
 from facegen.animation.performance import Performance
 from facegen.animation.streams.calibrate import Calibration, calibrated
 from facegen.animation.streams.formats import FORMATS, Sample, Wish, detect, for_output, format_of, register
+from facegen.animation.streams.gltf import GLTF
 from facegen.animation.streams.libreface import LIBREFACE
 from facegen.animation.streams.livelink import LIVELINK
 from facegen.animation.streams.mediapipe import MEDIAPIPE, MEDIAPIPE_CSV
@@ -23,7 +24,7 @@ from facegen.errors import InputError
 from facegen.fileio.table import head_of
 from facegen.fileio.textfile import check_place
 
-for _format in (LIVELINK, OPENFACE, LIBREFACE, PYFEAT, MEDIAPIPE, MEDIAPIPE_CSV, OWN):
+for _format in (GLTF, LIVELINK, OPENFACE, LIBREFACE, PYFEAT, MEDIAPIPE, MEDIAPIPE_CSV, OWN):
     register(_format)
 
 
@@ -35,9 +36,10 @@ def load_performance(path: str | os.PathLike[str], *, format: str | None = None,
 
     format: a name in `FORMATS`; by default the one that the content is of. fps: frames a second, for files that have
     no times; it goes before a file's own times, and of a timecode it is what it counts in. person: which face, where
-    there are several; by default the one that is there most often. presence: the weight 0..1 of a unit that the file
-    only calls present; by default it is left out. calibrate, smooth: done after reading, in this order; as text, see
-    `facegen.animation.streams.calibrate.parse_calibration` and `facegen.animation.streams.smooth.parse_smooth`.
+    there are several, by default the one that is there most often; of a glTF file, which animation. presence: the
+    weight 0..1 of a unit that the file only calls present; by default it is left out. calibrate, smooth: done after
+    reading, in this order; as text, see `facegen.animation.streams.calibrate.parse_calibration` and
+    `facegen.animation.streams.smooth.parse_smooth`.
 
     What was odd stands in ``warnings``, with its lines. Raises FileError or InputError. ::
 

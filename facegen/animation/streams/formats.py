@@ -12,7 +12,7 @@ from pathlib import Path
 
 from facegen.animation.performance import Performance
 from facegen.errors import FileError, InputError, nearest
-from facegen.fileio.table import fold, header_of
+from facegen.fileio.table import are_numbers, fold, header_of, shown
 
 
 @dataclass(frozen=True)
@@ -36,9 +36,14 @@ class Sample:
     head: bytes
 
     @cached_property
+    def names(self) -> tuple[str, ...]:
+        """The names in the first line; none if this is no table."""
+        return header_of(self.head)
+
+    @cached_property
     def columns(self) -> frozenset[str]:
-        """The names in the first line, without capitals and spaces; none if this is no table."""
-        return frozenset(map(fold, header_of(self.head)))
+        """The same without capitals and spaces."""
+        return frozenset(map(fold, self.names))
 
     @cached_property
     def is_json(self) -> bool:
@@ -89,7 +94,11 @@ def detect(sample: Sample) -> Format:
     for one in FORMATS.values():
         if one.read is not None and one.knows(sample):
             return one
-    seen = ", ".join(repr(name) for name in header_of(sample.head)[:6])
+    names = sample.names
+    if are_numbers(names):
+        raise FileError(f"{sample.path}: line 1: expected the names of the columns, got numbers "
+                        f"({', '.join(names[:4])} ...): put the header back on top")
+    seen = ", ".join(map(shown, names[:6]))
     raise FileError(f"{sample.path}: is none of the recordings that are known by their content "
                     f"({', '.join(FORMATS)})" + (f"; its columns begin with {seen}" if seen else "")
                     + "; if it is one of them nevertheless, say which format")

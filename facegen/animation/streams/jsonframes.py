@@ -68,27 +68,29 @@ class _Reader:
     def read(self) -> tuple[list[Frame], list[str]]:
         start = len(self.text) - len(self.text.lstrip())
         if self.text[start:start + 1] == "[":
-            return self._values(start + 1)
+            return self._values(start + 1, True)
         first = self._value(start)
         if first is None:                               # an object that stops: its list may be there
             found = re.search(rf'"(?:{"|".join(_LISTS)})"\s*:\s*\[', self.text[:10_000])
             if found is None:
                 raise self._broken(start)
-            return self._values(found.end())
+            return self._values(found.end(), True)
         value, end = first
         if isinstance(value, dict):
             inside = next((value[key] for key in _LISTS if isinstance(value.get(key), list)), None)
             if inside is not None and not self.text[end:].strip():
                 return [Frame(one, self._line(start)) for one in inside], []
             if inside is None or self.text[end:].strip():
-                return self._values(start)
+                return self._values(start, False)
         raise FileError(f"{self.path}: expected a list of frames, or an object with one")
 
-    def _values(self, at: int) -> tuple[list[Frame], list[str]]:
+    def _values(self, at: int, listed: bool) -> tuple[list[Frame], list[str]]:
         frames, said = [], []
         while True:
             at = _GAP.match(self.text, at).end()
             if at >= len(self.text) or self.text[at] in "]}":
+                if listed and at >= len(self.text):
+                    said.append(f"the file stops before its list ends; its {len(frames)} frames are kept")
                 return frames, said
             found = self._value(at)
             if found is None:

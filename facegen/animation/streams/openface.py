@@ -7,6 +7,7 @@ millimetres in the camera's axes.
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -26,6 +27,8 @@ NAME = "openface"
 UNITS = ("1", "2", "4", "5", "6", "7", "9", "10", "12", "14", "15", "17", "20", "23", "25", "26", "45")
 """The units that OpenFace gives the intensity of; of 28 only the presence."""
 
+# Small letters only: in our own files AU12_R is the right side.
+_COLUMN = re.compile(r"AU_?0*([0-9]{1,2})_([rc])", re.ASCII)
 _EYES = tuple(tuple(f"gaze_{eye}_{axis}" for axis in "xyz") for eye in (0, 1))
 _ANGLES = ("gaze_angle_x", "gaze_angle_y")
 _PLACE, _TURN = ("pose_Tx", "pose_Ty", "pose_Tz"), ("pose_Rx", "pose_Ry", "pose_Rz")
@@ -36,8 +39,7 @@ _ROUGH = 2e-3
 
 def knows(sample: Sample) -> bool:
     """Return whether a file has columns such as AU01_r or AU01_c."""
-    return any(name[:2] == "au" and name[-2:] in ("_r", "_c") and tabular.number_of(name[:-2])
-               for name in sample.columns)
+    return any(map(_COLUMN.fullmatch, sample.names))
 
 
 def weights_of(intensities: Array) -> Array:
@@ -53,7 +55,7 @@ def intensities_of(weights: Array) -> Array:
 def read(path: Path, wish: Wish) -> Performance:
     """Return the performance of a file. FileError, InputError."""
     table = read_table(path)
-    strong, there = _units(table, "_r"), _units(table, "_c")
+    strong, there = _units(table, "r"), _units(table, "c")
     said = [] if strong else [f"no intensities (AU01_r ...){'; only presence' if there else ''}"]
     if not strong and not there:
         raise FileError(f"{path}: expected columns such as AU01_r (the intensities of action units); "
@@ -75,7 +77,7 @@ def read(path: Path, wish: Wish) -> Performance:
     turn, place = tabular.stack(table, _TURN), tabular.stack(table, _PLACE)
     head = None if turn is None else _without(head_of_camera(turn), lost)
     frames = tabular.column_of(table, "frame")
-    times = tabular.seconds(table, wish, tabular.column_of(table, "timestamp"), frames)
+    times = tabular.seconds(table, wish, tabular.column_of(table, "timestamp", "time"), frames)
     return tabular.performance(
         table, NAME, "units", {code: _without(one, lost) for code, one in weights.items()}, times, rows=rows,
         person=person if ids is not None else "", said=[*said, *more], head=head,
@@ -132,9 +134,9 @@ def presence(table: Table, there: dict[str, Array], weights: dict[str, Array], w
 def _units(table: Table, ending: str) -> dict[str, Array]:
     found = {}
     for name in table.columns:
-        number = tabular.number_of(name[:-2]) if name.casefold().endswith(ending) else None
-        if number and number not in found:
-            found[number] = table.column(name)
+        match = _COLUMN.fullmatch(name)
+        if match and match[2] == ending and match[1] not in found:
+            found[match[1]] = table.column(name)
     return found
 
 

@@ -5,6 +5,7 @@ Any vocabulary: units as AU12 or AU12_L, every other shape by its name. The voca
 
 from __future__ import annotations
 
+from functools import cache
 from pathlib import Path
 
 from numpy.typing import NDArray
@@ -24,20 +25,21 @@ PARTS = {"head": ("head_yaw", "head_pitch", "head_roll"), "place": ("head_x", "h
          "gaze": ("gaze_yaw_L", "gaze_pitch_L", "gaze_yaw_R", "gaze_pitch_R")}
 _TIMES = (TIME, "seconds", "t")
 _COUNTS = ("frame", "frame_idx", "index", "")
+_ASIDE = frozenset(name.casefold() for names in (_TIMES, _COUNTS, *PARTS.values()) for name in names)
 
 
 def knows(sample: Sample) -> bool:
-    """Return whether a file has a time, or a name of a shape that is known."""
-    if {TIME, "frame"} & sample.columns and len(sample.columns) > 1:
+    """Return whether a file has a time, or mostly names of shapes that are known."""
+    if TIME in sample.columns and len(sample.columns) > 1:
         return True
-    return any(_names(sorted(sample.columns), name) for name in SETS)
+    shapes = sorted(sample.columns - _ASIDE)
+    return bool(shapes) and _vocabulary(shapes) is not None
 
 
 def read(path: Path, wish: Wish) -> Performance:
     """Return the performance of a file. FileError, InputError."""
     table = read_table(path)
-    aside = {name.casefold() for names in (_TIMES, _COUNTS, *PARTS.values()) for name in names}
-    shapes = [name for name in table.columns if name.casefold() not in aside and name in table.numbers]
+    shapes = [name for name in table.columns if name.casefold() not in _ASIDE and name in table.numbers]
     if not shapes:
         raise FileError(f"{path}: expected a column for each shape, such as jawOpen or AU12, beside '{TIME}'")
     vocabulary = _vocabulary(shapes) or "shapes"
@@ -75,13 +77,19 @@ def _names(columns: list[str], vocabulary: str) -> dict[str, str]:
     if vocabulary == "shapes":
         return {name: name for name in columns}
     if vocabulary != "units":
-        return match(columns, {shape: recipe.also for shape, recipe in shape_set(vocabulary).items()})
+        return match(columns, _known(vocabulary))
     codes, found = set(load_catalogue().codes), {}
     for name in columns:
         code = member_of(name.strip().upper())
         if code in codes and code not in found.values():
             found[name] = code
     return found
+
+
+@cache
+def _known(vocabulary: str) -> dict[str, tuple[str, ...]]:
+    """Return the shapes of a vocabulary and what others call them."""
+    return {shape: recipe.also for shape, recipe in shape_set(vocabulary).items()}
 
 
 def _vocabulary(columns: list[str]) -> str | None:

@@ -23,7 +23,7 @@ Array = NDArray[np.float64]
 # After a gap longer than this, in seconds, what was before says nothing of what is now: the filter starts anew.
 _FORGOTTEN = 0.5
 # Angles and millimetres are this many times what weights are: the speed term is made for weights a second.
-_PER_WEIGHT = {"weights": 1.0, "head": 30.0, "place": 100.0, "gaze": 25.0}
+PER_WEIGHT = {"weights": 1.0, "head": 30.0, "place": 100.0, "gaze": 25.0}
 
 
 @dataclass(frozen=True)
@@ -74,7 +74,7 @@ def parse_smooth(text: str) -> OneEuro:
 def smoothed(one: Performance, euro: OneEuro | None = None) -> Performance:
     """Return a performance whose weights, head, place and gaze are filtered. Missing numbers stay missing."""
     euro = euro or OneEuro()
-    parts = {name: one_euro(one.times, values, euro, scale) for name, scale in _PER_WEIGHT.items()
+    parts = {name: one_euro(one.times, values, euro, scale) for name, scale in PER_WEIGHT.items()
              if (values := getattr(one, name)) is not None}
     return replace(one, **parts, about={**one.about, "smooth": f"{euro.cutoff:g},{euro.beta:g}"})
 
