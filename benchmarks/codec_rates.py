@@ -1,7 +1,7 @@
 """Bits against millimetres: parameter streams of real recordings, beside zlib on the same steps and MPEG-4's figure.
 
-    python benchmarks/codec_rates.py              prints the tables of docs/codec.md; --write puts them there, with a chart
-    python benchmarks/codec_rates.py --count      how often each question is answered "no": what the priors are rounded from
+    python benchmarks/codec_rates.py            prints the tables of docs/codec.md; --write puts them there, and a chart
+    python benchmarks/codec_rates.py --count    how often each question is answered "no": priors are rounded from this
 
 Errors are distances between the skin's vertices of the base face (level 1), played from the recording and from the
 stream, over all vertices and all frames: movements of shapes are added, a turned head is taken to first order.
@@ -247,8 +247,8 @@ def main() -> None:
         count(found)
         return
     tables = {"rate": rate_table(found), "delay": delay_table(found["facecap"]), "loss": loss_table(found["facecap"])}
-    tables["machine"] = [f"`python benchmarks/codec_rates.py --write`, {time.strftime('%Y-%m-%d')}, {platform.machine()}, "
-                         f"Python {platform.python_version()}, numpy {np.__version__}."]
+    tables["machine"] = [f"`python benchmarks/codec_rates.py --write`, {time.strftime('%Y-%m-%d')}, "
+                         f"{platform.machine()}, Python {platform.python_version()}, numpy {np.__version__}."]
     for lines in tables.values():
         print("\n".join(lines), end="\n\n", flush=True)
     if wanted.write:

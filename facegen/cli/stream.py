@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Annotated, BinaryIO
 import typer
 
 from facegen.cli.options import FaceName, Json, PersonName, Quiet, Size, View, print_json, read_size, read_view, warn
-from facegen.cli.picture import RendererName
+from facegen.cli.picture import Detail, RendererName
 from facegen.cli.recordings import (
     Calibrate,
     CalibrateHead,
@@ -115,7 +115,8 @@ def encode(recording: Recording, output: Sink = _PIPE, rate: Rate = 25.0, qualit
 
 def decode(source: Incoming = _PIPE, output: Outputs = None, target: Target = None, render: Shown = None,
            face: FaceName = "akimoto", size: Size = "512", view: View = "0,0", renderer: RendererName = "auto",
-           wait: Wait = None, timeout: Timeout = 30.0, json: Json = False, quiet: Quiet = False) -> None:
+           detail: Detail = None, wait: Wait = None, timeout: Timeout = 30.0, json: Json = False,
+           quiet: Quiet = False) -> None:
     """Receive a stream, and write it as a recording or draw it.
 
     For example: facegen encode recording.csv | facegen decode -o again.csv
@@ -145,9 +146,9 @@ def decode(source: Incoming = _PIPE, output: Outputs = None, target: Target = No
         check_film(film := render, size=pixels, fps=25.0)
     decoder = Decoder(wait=(_PATIENT if render is None or film else _LIVE) if wait is None else wait)
     if render is not None and film is None:
-        from facegen.jobs.live import LivePictures
+        from facegen.jobs.live_pictures import LivePictures
 
-        live = LivePictures(render, face=face, size=pixels, view=angles, renderer=renderer)
+        live = LivePictures(render, face=face, size=pixels, view=angles, detail=detail, renderer=renderer)
     kept: list[Frame] = []
     with _stoppable() as stop, (nullcontext() if address is not None else _reader(source)) as file:
         frames = receive_udp(decoder, address, timeout=timeout, stopped=stop.asked,
@@ -168,7 +169,8 @@ def decode(source: Incoming = _PIPE, output: Outputs = None, target: Target = No
         rate = float(decoder.dictionary.rate)
         said += [one for one in as_motion(performance).warnings if one not in said]
         with progress("frames", as_motion(performance).frames(rate), quiet=quiet) as step:
-            save_clip(performance, film, fps=rate, size=pixels, view=angles, face=face, renderer=renderer, step=step)
+            save_clip(performance, film, fps=rate, size=pixels, view=angles, face=face, detail=detail,
+                      renderer=renderer, step=step)
     if not quiet:
         warn(said)
         print(f"{source}: {len(kept)} frames" + (", stopped" if stop.asked() else ""), file=sys.stderr)

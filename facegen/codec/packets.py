@@ -22,6 +22,8 @@ MAGIC = b"FGP1"
 MARK = 0xFA
 """Goes before every packet there, with its length in two bytes."""
 
+_KNOWN = 8                  # dictionaries whose packets are known by their checks in one row of bytes
+
 ROUND = 1 << 16
 """Packets are numbered up to this, then from 0 on again."""
 
@@ -70,7 +72,8 @@ def framed(packet: bytes) -> bytes:
 class Unframer:
     """Takes a row of bytes in any pieces, gives the packets in it.
 
-    What is no packet is passed over up to the next one: ``skipped`` counts those bytes. ::
+    What is no packet, or fails its check, is passed over up to the next one: ``skipped`` counts those bytes. Before a
+    dictionary has come packets cannot be checked, and are given as they are. ::
 
         unframer = Unframer()
         for piece in pieces:
@@ -80,6 +83,7 @@ class Unframer:
 
     def __init__(self) -> None:
         self._held, self.skipped = b"", 0
+        self._streams: list[bytes] = []
 
     def push(self, data: bytes, *, last: bool = False) -> list[bytes]:
         """Return the packets that are whole now; ``last``: nothing comes after, so what has begun is not waited for."""
@@ -88,7 +92,7 @@ class Unframer:
             taken, packet = _look(held, at)
             if taken == 0 and not last:
                 break
-            if packet is not None:
+            if packet is not None and self._whole(packet):
                 packets.append(packet)
             elif not held.startswith(MAGIC, at):
                 taken = 1
@@ -97,9 +101,19 @@ class Unframer:
         self._held = held[at:]
         return packets
 
+    def _whole(self, packet: bytes) -> bool:
+        """Return whether a packet passes its check, and keep the id if it is a dictionary's."""
+        streams = [b""] if kind_of(packet) == DICTIONARY else self._streams
+        if not any(packet[3:HEADER] == _check(stream, packet[:3], packet[HEADER:]) for stream in streams):
+            return not streams
+        stream = packet[HEADER:HEADER + 4]
+        if kind_of(packet) == DICTIONARY and stream not in self._streams:
+            self._streams = [*self._streams, stream][-_KNOWN:]
+        return True
+
 
 def _look(held: bytes, at: int) -> tuple[int, bytes | None]:
-    """Return how many bytes to take from a place on, 0 if more must come to know, and the packet in them if any."""
+    """Return how many bytes to take from a place on, 0 if more must come to know, and what they hold if a packet."""
     left = len(held) - at
     if held[at] == MAGIC[0] and MAGIC.startswith(held[at:at + len(MAGIC)]):
         return (len(MAGIC) if left >= len(MAGIC) else 0), None
@@ -110,9 +124,4 @@ def _look(held: bytes, at: int) -> tuple[int, bytes | None]:
     length = int.from_bytes(held[at + 1:at + 3], "big")
     if kind_of(held[at + 3:at + 3 + HEADER]) is None or not HEADER <= length <= MTU:
         return 1, None
-    if left < 3 + length:
-        return 0, None
-    after = held[at + 3 + length:at + 4 + length]       # a damaged length does not end where a packet begins
-    if after and after[0] not in (MARK, MAGIC[0]):
-        return 1, None
-    return 3 + length, held[at + 3:at + 3 + length]
+    return (3 + length, held[at + 3:at + 3 + length]) if left >= 3 + length else (0, None)
