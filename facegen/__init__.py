@@ -24,6 +24,9 @@ if TYPE_CHECKING:
     from facegen.animation.speech_script import say, speech_clip
     from facegen.animation.streams.files import load_performance, save_performance
     from facegen.blendshapes.recipes import Recipe, shape_set
+    from facegen.codec.decoder import Decoder
+    from facegen.codec.encoder import Encoder
+    from facegen.codec.recording import decode_packets, encode_performance
     from facegen.errors import FacegenError, FileError, InputError, JobError, NotationError, TableError
     from facegen.face.avatar import AvatarFace
     from facegen.face.convert import Conversion, convert
@@ -56,7 +59,9 @@ __all__ = [
     "Clip",
     "Controls",
     "Conversion",
+    "Decoder",
     "Deformation",
+    "Encoder",
     "Face",
     "FacegenError",
     "FileError",
@@ -80,6 +85,8 @@ __all__ = [
     "canonical",
     "contact_sheet",
     "convert",
+    "decode_packets",
+    "encode_performance",
     "face_names",
     "fit_files",
     "fit_landmarks",
@@ -123,6 +130,9 @@ _HOMES = {
     "facegen.animation.speech_script": ("say", "speech_clip"),
     "facegen.animation.streams.files": ("load_performance", "save_performance"),
     "facegen.blendshapes.recipes": ("Recipe", "shape_set"),
+    "facegen.codec.decoder": ("Decoder",),
+    "facegen.codec.encoder": ("Encoder",),
+    "facegen.codec.recording": ("decode_packets", "encode_performance"),
     "facegen.errors": ("FacegenError", "FileError", "InputError", "JobError", "NotationError", "TableError"),
     "facegen.face.avatar": ("AvatarFace",),
     "facegen.face.convert": ("Conversion", "convert"),

@@ -27,6 +27,7 @@ from facegen.cli import (
 )
 from facegen.cli import fit as fitting
 from facegen.cli import rig as rigging
+from facegen.cli import stream as streaming
 from facegen.errors import FacegenError, InputError
 
 DONE, STOPPED, WRONG = 0, 1, 2
@@ -53,6 +54,8 @@ app.command("speak")(speak.speak)
 app.command("phoneme")(phoneme.phoneme)
 app.command("convert")(convert.convert)
 app.command("adopt")(adopting.adopt)
+app.command("encode")(streaming.encode)
+app.command("decode")(streaming.decode)
 
 
 def _version(asked: bool) -> None:
