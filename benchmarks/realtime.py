@@ -107,6 +107,9 @@ def page(found: dict[str, tuple[list[Way], list[Way], int, int]], renderer: str,
              f"`{command}`, {datetime.date.today().isoformat()}, on {processor()}, {len(cores())} cores, "
              f"{platform.system()}, Python {platform.python_version()}; {', '.join(versions())}. Load of the machine "
              f"before the run: {load:.1f}."]
+    if load > len(cores()):
+        parts.append("The machine was busy with other work: times are longer than on a quiet one; the ways suffered "
+                     "alike.")
     if quick:
         parts.append("**A quick run with few frames: its figures are rough.**")
     for what, (vertices, pictures, count, shapes) in found.items():
