@@ -82,9 +82,9 @@ def ways_of(face: object, renderer: str) -> tuple[list[Way], list[Way]]:
                 Way("convert, face.pose", lambda frame: face.pose(converted(frame), detail=detail))]
     if hasattr(face, "pose_shapes"):
         vertices.append(Way("face.pose_shapes", face.pose_shapes))
-    quick = facegen.Live(face, "arkit", size=SIZE, renderer=renderer, occlusion="neutral")
+    fine = facegen.Live(face, "arkit", size=SIZE, renderer=renderer, occlusion="posed")
     pictures = [Way("Live.draw", live.draw, "convert, Renderer.draw"),
-                Way('Live.draw, occlusion="neutral"', quick.draw, "convert, Renderer.draw"),
+                Way('Live.draw, occlusion="posed"', fine.draw, "convert, Renderer.draw"),
                 Way("convert, Renderer.draw", lambda frame: kept.draw(converted(frame))),
                 Way("convert, facegen.render", lambda frame: facegen.render(
                     face, converted(frame), size=SIZE, renderer=renderer))]
@@ -107,6 +107,9 @@ def page(found: dict[str, tuple[list[Way], list[Way], int, int]], renderer: str,
              f"`{command}`, {datetime.date.today().isoformat()}, on {processor()}, {len(cores())} cores, "
              f"{platform.system()}, Python {platform.python_version()}; {', '.join(versions())}. Load of the machine "
              f"before the run: {load:.1f}."]
+    if load > len(cores()):
+        parts.append("The machine was busy with other work: times are longer than on a quiet one; the ways suffered "
+                     "alike.")
     if quick:
         parts.append("**A quick run with few frames: its figures are rough.**")
     for what, (vertices, pictures, count, shapes) in found.items():
@@ -118,8 +121,8 @@ def page(found: dict[str, tuple[list[Way], list[Way], int, int]], renderer: str,
               "`face.pose_shapes` takes an avatar's own weights, without the head. `Live` needs no conversion: an "
               "avatar's own shapes take the weights as they are, and the parametric face adds movements that were made "
               f"ready.\n- The ways take turns of {TURN - 1} frames; {min(counts)} to {max(counts)} frames are timed, "
-              "fewer for slow ways.\n- `occlusion=\"neutral\"` works out once, for the neutral, how far each vertex "
-              "sees out; the others do for every frame, which is right for mouths that open wide."]
+              "fewer for slow ways.\n- `Live.draw` works out once, for the neutral, how far each vertex sees out; "
+              "the others do for every frame, which is right for mouths that open wide."]
     return "\n\n".join(parts) + "\n"
 
 

@@ -35,7 +35,8 @@ class Live:
     "expressions", or "shapes" for an avatar's own. names: the order of the weights in arrays; by default the
     vocabulary's own (of "shapes": the avatar's). size: pixels of the pictures; None: vertices only. smooth: True,
     "1.5,2" or a `OneEuro` for the One Euro filter, or your own ``function(seconds, weights (k,)) -> weights (k,)``.
-    detail: of the parametric face; by default what the size takes. The rest is for the `Renderer`.
+    detail: of the parametric face; by default what the size takes. occlusion: "neutral" is quick, "posed" is right for
+    mouths that open wide. The rest is for the `Renderer`.
 
     ``names``; ``mesh``: what the vertices belong to; ``warnings``: what the rig cannot show. One caller at a time.
     Raises InputError. ::
@@ -47,11 +48,12 @@ class Live:
 
     def __init__(self, rig: Any = "akimoto", vocabulary: str = "arkit", *, names: Sequence[str] | None = None,
                  size: int | tuple[int, int] | None = None, smooth: OneEuro | str | bool | Hook | None = None,
-                 detail: int | None = None, renderer: str = "auto", **look: Any) -> None:
+                 detail: int | None = None, renderer: str = "auto", occlusion: str = "neutral", **look: Any) -> None:
         face = rig if hasattr(rig, "pose") and hasattr(rig, "mesh") else load_face(rig)
         if size is None and look:
             raise InputError(f"{next(iter(look))}: is for pictures, but there are none: give a size")
-        self._renderer = None if size is None else Renderer(face, size=size, detail=detail, renderer=renderer, **look)
+        self._renderer = None if size is None else Renderer(
+            face, size=size, detail=detail, renderer=renderer, occlusion=occlusion, **look)
         level = self._renderer.detail if self._renderer is not None else _DETAIL if detail is None else detail
         self.mesh: Mesh = face.mesh(level)
         names = _names(face, vocabulary) if names is None else tuple(names)
