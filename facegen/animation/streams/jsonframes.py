@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Generic, TypeVar
 
+from facegen.animation.streams.times import places
 from facegen.errors import FileError
 
 MOST_BYTES = 1_000_000_000
@@ -64,7 +65,8 @@ def frames_of(path: Path, keep: Callable[[Frame], Kept]) -> tuple[list[Kept], li
     reader.read()
     if not reader.kept:
         raise FileError(f"{path}: has no frames")
-    return reader.kept, reader.lines, reader.said
+    bad = [f"{places(reader.broken)}: cannot be read as JSON; left out"] if reader.broken else []
+    return reader.kept, reader.lines, bad + reader.said
 
 
 class _Reader(Generic[Kept]):
@@ -77,6 +79,7 @@ class _Reader(Generic[Kept]):
         self.kept: list[Kept] = []
         self.lines: list[int] = []
         self.said: list[str] = []
+        self.broken: list[int] = []
 
     def read(self) -> None:
         """Read all frames."""
@@ -108,25 +111,39 @@ class _Reader(Generic[Kept]):
             if found is None:
                 if not self.kept:
                     raise self._broken(at)
-                line, after = self._line(at), self.text.find("\n{", at)
-                if after < 0:
+                return self._lines_from(at)
+            value, at_end = found
+            self._take(value, self._line(at))
+            at = at_end
+
+    def _lines_from(self, at: int) -> None:
+        """Read on line by line where one could not be read. Each by itself, because an error costs all the text it is
+        found in."""
+        while True:
+            after = self.text.find("\n{", at)
+            piece, place = self.text[at:after if after >= 0 else len(self.text)], 0
+            while (place := _GAP.match(piece, place).end()) < len(piece) and piece[place] not in "]}":
+                line, found = self._line(at + place), self._value(place, piece)
+                if found is None and after < 0:
                     self.said.append(f"line {line}: the file stops in the middle of a frame, or cannot be read from "
                                      f"here; the {len(self.kept)} frames before it are kept")
-                    return
-                self.said.append(f"line {line}: cannot be read as JSON; left out")     # one result a line: go on
-                at = after + 1
-                continue
-            value, end = found
-            self._take(value, self._line(at))
-            at = end
+                elif found is None:
+                    self.broken.append(line)
+                if found is None:
+                    break
+                self._take(found[0], line)
+                place = found[1]
+            if after < 0:
+                return
+            at = after + 1
 
     def _take(self, value: Any, line: int) -> None:
         self.kept.append(self.keep(Frame(value)))
         self.lines.append(line)
 
-    def _value(self, at: int) -> tuple[Any, int] | None:
+    def _value(self, at: int, text: str | None = None) -> tuple[Any, int] | None:
         try:
-            return self.decoder.raw_decode(self.text, at)
+            return self.decoder.raw_decode(self.text if text is None else text, at)
         except RecursionError:
             raise FileError(f"{self.path}: line {self._line(at)}: nested too deeply") from None
         except ValueError:                              # also an integer of thousands of digits

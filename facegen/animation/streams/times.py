@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -45,14 +46,14 @@ def in_order(path: Path, times: NDArray[np.float64], lines: NDArray[np.int64]) -
     if not len(rows):
         raise FileError(f"{path}: no row has a time")
     if lost := np.setdiff1d(np.arange(len(times)), rows).tolist():
-        warnings.append(f"{_places(lines[lost])}: no time; left out")
+        warnings.append(f"{places(lines[lost])}: no time; left out")
     early = rows[1:][np.diff(times[rows]) < 0]
     if len(early):
-        warnings.append(f"{_places(lines[early])}: earlier than the line before; put in the order of time")
+        warnings.append(f"{places(lines[early])}: earlier than the line before; put in the order of time")
         rows = rows[np.argsort(times[rows], kind="stable")]
     again = np.flatnonzero(np.diff(times[rows]) == 0) + 1
     if len(again):
-        warnings.append(f"{_places(lines[rows[again]])}: the time of another line; left out")
+        warnings.append(f"{places(lines[rows[again]])}: the time of another line; left out")
         rows = np.delete(rows, again)
     steps = np.diff(times[rows])
     gaps = np.flatnonzero(steps > _GAP * np.median(steps)) if len(steps) > 1 else []
@@ -64,7 +65,7 @@ def in_order(path: Path, times: NDArray[np.float64], lines: NDArray[np.int64]) -
     return rows, warnings
 
 
-def _places(lines: NDArray[np.int64]) -> str:
-    """Return line numbers in words."""
+def places(lines: Sequence[int] | NDArray[np.int64]) -> str:
+    """Return line numbers in words: the first few, and how many more."""
     more = f" and {len(lines) - _TOLD} more" if len(lines) > _TOLD else ""
-    return f"line{'s' if len(lines) > 1 else ''} {', '.join(map(str, lines[:_TOLD].tolist()))}{more}"
+    return f"line{'s' if len(lines) > 1 else ''} {', '.join(str(int(line)) for line in lines[:_TOLD])}{more}"

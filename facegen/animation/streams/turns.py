@@ -27,7 +27,7 @@ def head_of_camera(turns: Array) -> Array:
 
 def head_of(turns: Rotation) -> Array:
     """Return yaw, pitch, roll (n, 3) in degrees of turns in our axes."""
-    return turns.as_euler("YXZ", degrees=True) * _SIGNS
+    return turns.as_euler("YXZ", degrees=True) * _SIGNS + 0.0        # + 0.0: no minus zero
 
 
 def camera_of_head(head: Array) -> Array:

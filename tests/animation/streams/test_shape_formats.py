@@ -226,3 +226,11 @@ def test_our_own_with_names_that_are_nobodys(load):
 def test_our_own_without_shapes(load):
     with pytest.raises(FileError, match="expected a column for each shape"):
         load("time,name\n0,x\n")
+
+
+def test_many_bad_lines_are_one_warning(load):
+    good = json.dumps(mediapipe_frame(0))
+    one = load(good + '\n{"x' * 50 + "\n" + json.dumps(mediapipe_frame(1)), "r.json")
+    assert len(one) == 2
+    assert [warning for warning in one.warnings if "JSON" in warning] == [
+        warning for warning in one.warnings if "lines 2, 3, 4 and 47 more: cannot be read as JSON; left out" in warning]
