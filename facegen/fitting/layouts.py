@@ -9,7 +9,7 @@ because closed lips lie on each other.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,7 +34,7 @@ _FACING = -0.2
 _LEAST = 6
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Layout:
     """``count``: points that a detector gives; ``indices`` (p,): those used; ``shares`` (p,): how much each counts;
     ``groups``: what each belongs to; ``places``: a landmark's name or a place on the base face's cage."""
@@ -86,9 +86,10 @@ def _layouts() -> dict[str, Layout]:
     return found
 
 
+@lru_cache(maxsize=16)
 def layout_rows(face: Rig, layout: Layout) -> sparse.csr_array:
     """Return the weights (p, n) of the vertices of ``face.mesh()`` that place the points of a layout; a row of zeros
-    for one that the rig has not (a pupil). InputError for a rig whose landmarks are not known."""
+    for one that the rig has not (a pupil); kept. InputError for a rig whose landmarks are not known."""
     if face is load_face():
         return _base_rows(layout)
     known, rows = landmark_rows(face)
