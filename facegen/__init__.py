@@ -30,7 +30,8 @@ if TYPE_CHECKING:
     from facegen.errors import FacegenError, FileError, InputError, JobError, NotationError, TableError
     from facegen.face.avatar import AvatarFace
     from facegen.face.convert import Conversion, convert
-    from facegen.face.face import Controls, Face, face_names, load_face
+    from facegen.face.face import Controls, Face, load_face
+    from facegen.face.named import face_names
     from facegen.facs.deformation import Deformation, load_deformation
     from facegen.facs.expression_table import people
     from facegen.facs.expressions import Resolution, presets, resolve
@@ -136,7 +137,8 @@ _HOMES = {
     "facegen.errors": ("FacegenError", "FileError", "InputError", "JobError", "NotationError", "TableError"),
     "facegen.face.avatar": ("AvatarFace",),
     "facegen.face.convert": ("Conversion", "convert"),
-    "facegen.face.face": ("Controls", "Face", "face_names", "load_face"),
+    "facegen.face.face": ("Controls", "Face", "load_face"),
+    "facegen.face.named": ("face_names",),
     "facegen.facs.deformation": ("Deformation", "load_deformation"),
     "facegen.facs.expression_table": ("people",),
     "facegen.facs.expressions": ("Resolution", "presets", "resolve"),

@@ -70,8 +70,8 @@ def shapes(name: ShapeSet = "arkit", person: PersonName = None, json: Json = Fal
 @app.command()
 def faces(json: Json = False) -> None:
     """Faces that can be drawn: name, number of feature points and regions; and heads that a package offers."""
-    from facegen.face.face import face_names, offered_names
     from facegen.face.face import load_face as load
+    from facegen.face.named import face_names, offered_names
 
     rows = []
     for name in face_names():

@@ -9,8 +9,6 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache, cached_property, lru_cache
-from importlib import import_module
-from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -18,7 +16,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from facegen.data import meshes_dir
 from facegen.errors import InputError, nearest
 from facegen.face.attach import Attachment, attach
 from facegen.face.deformer import Array, Deformer
@@ -27,6 +24,7 @@ from facegen.face.folds import fold_field
 from facegen.face.head import turn_head
 from facegen.face.landmarks import landmark_weights
 from facegen.face.loader import FINEST, FaceData, read_face
+from facegen.face.named import face_file, shipped_faces
 from facegen.facs.deformation import Deformation, weighted_sum
 from facegen.facs.expressions import Resolution, resolve
 from facegen.geometry.mesh import Mesh, merge
@@ -44,9 +42,6 @@ AVATARS = (".glb", ".gltf", ".vrm")
 
 BARE = (".obj", ".ply", ".stl")
 """Files of meshes, which cannot have any."""
-
-OFFERED = {"anny": "facegen.adoption.anny_heads"}
-"""Package -> the module whose ``face_of`` makes faces out of its heads: by name, as it lies in a room above."""
 
 DEEPEST_FOLD = 1.25
 """Largest amount of a fold."""
@@ -430,53 +425,6 @@ def _placed(names: Iterable[str], weights: sparse.csr_array, vertices: Array, de
     return dict(zip(names, weights @ vertices, strict=True))
 
 
-@cache
-def _shipped() -> Mapping[str, Path]:
-    return {p.parent.name: p for p in sorted(meshes_dir().glob("*/face.yaml"))}
-
-
-def face_names() -> tuple[str, ...]:
-    """Return the names of the shipped faces."""
-    return tuple(_shipped())
-
-
-def offered_names() -> tuple[str, ...]:
-    """Return the names of faces that installed packages offer, such as "anny:child"; others go by more words."""
-    return tuple(name for package, module in OFFERED.items() if find_spec(package)
-                 for name in import_module(module).head_names())
-
-
-def is_face_name(face: str | Path) -> bool:
-    """Return whether this is the name of a face, shipped or offered by a package, and not a path."""
-    return str(face) in _shipped() or _offer(str(face)) is not None
-
-
-def face_file(face: str | Path) -> Path:
-    """Return the file of a face: the ``face.yaml`` of a shipped one by name, of a folder, of one that a package offers
-    ("anny:child"), or the path of one or of an avatar. Raises InputError."""
-    if not isinstance(face, (str, Path)):
-        raise InputError(f"face: expected a name or a path, got {type(face).__name__}; see face_names()")
-    shipped = _shipped()
-    if str(face) in shipped:
-        return shipped[str(face)]
-    offer = _offer(str(face))
-    if offer is not None:
-        return offer(str(face).partition(":")[2])
-    path = Path(face)
-    if path.is_dir():
-        path = path / "face.yaml"
-    if not path.is_file():
-        raise InputError(f"face: expected one of {', '.join(shipped)} or the path of a face.yaml or of a rigged avatar "
-                         f"(.glb), got {str(face)!r}{nearest(str(face), shipped)}")
-    return path
-
-
-def _offer(face: str) -> Callable[[str], Path] | None:
-    """Return what makes the faces of a package, if "package:head" names one."""
-    package, colon, _ = face.partition(":")
-    return import_module(OFFERED[package]).face_of if colon and package in OFFERED else None
-
-
 def load_face(face: str | Path = "akimoto") -> Face | AvatarFace:
     """Return a face: a shipped one by name, a head of the package anny by name ("anny:child"), another by the path of
     its folder or ``face.yaml``, or an avatar by the path of a file with blendshapes (.glb, .gltf, .vrm).
@@ -493,7 +441,7 @@ def load_face(face: str | Path = "akimoto") -> Face | AvatarFace:
     if suffix in AVATARS:
         state = path.stat()
         return _load_avatar(path.resolve(), state.st_mtime_ns, state.st_size)
-    return _load(path) if path in _shipped().values() else _load_folder(path.resolve(), _changes(path))
+    return _load(path) if path in shipped_faces().values() else _load_folder(path.resolve(), _changes(path))
 
 
 def _changes(path: Path) -> tuple[tuple[str, int, int], ...]:

@@ -9,7 +9,8 @@ from pathlib import Path
 from typing import Any
 
 from facegen.data import tables_dir
-from facegen.face.face import AVATARS, face_file, load_face
+from facegen.face.face import AVATARS, load_face
+from facegen.face.named import face_file
 from facegen.facs.yamlfile import read_data
 
 TABLES = ("action_units.yaml", "deformations.yaml", "expressions.yaml", "lights.yaml", "vocabularies.yaml")

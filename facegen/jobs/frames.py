@@ -28,7 +28,8 @@ from facegen.animation.performance import Performance
 from facegen.animation.playback import Playback
 from facegen.data import tables_dir
 from facegen.errors import FileError, InputError, TableError
-from facegen.face.face import is_face_name, load_face
+from facegen.face.face import load_face
+from facegen.face.named import is_face_name
 from facegen.face.rig import Rig
 from facegen.facs.deformation import Deformation
 from facegen.facs.expressions import Resolution, resolve

@@ -15,7 +15,8 @@ from pathlib import Path
 from typing import Any
 
 from facegen.errors import FacegenError, InputError, TableError
-from facegen.face.face import face_names, is_face_name, load_face
+from facegen.face.face import load_face
+from facegen.face.named import face_names, is_face_name
 from facegen.facs.expression_table import is_path
 from facegen.facs.expressions import Resolution, full_name, resolve
 from facegen.facs.units import load_catalogue

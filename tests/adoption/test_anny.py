@@ -14,7 +14,8 @@ from facegen.adoption.base import base_face
 from facegen.cli import main
 from facegen.data import tables_dir
 from facegen.errors import FileError, InputError
-from facegen.face.face import is_face_name, load_face, offered_names
+from facegen.face.face import load_face
+from facegen.face.named import is_face_name, offered_names
 from facegen.facs.yamlfile import read_data
 from facegen.fileio import anny
 from facegen.transfer.alignment import align

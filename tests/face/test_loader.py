@@ -9,8 +9,9 @@ import pytest
 from facegen.data import meshes_dir
 from facegen.errors import FileError, InputError, TableError
 from facegen.face import loader
-from facegen.face.face import face_names, load_face
+from facegen.face.face import load_face
 from facegen.face.loader import read_face
+from facegen.face.named import face_names
 from facegen.facs.yamlfile import read_data
 
 AKIMOTO = meshes_dir() / "akimoto"
