@@ -65,9 +65,9 @@ Timeout = Annotated[float, typer.Option("--timeout", metavar="S", help="Seconds 
 
 def encode(recording: Recording, output: Sink = _PIPE, fps: Rate = 25.0, quality: Quality = None,
            frames: FramesEach = 16, key_every: KeyEvery = 1, parts: Parts = None, realtime: Realtime = False,
-           source: Source = None, recorded_fps: RecordedRate = None, face_id: FaceId = None, calibrate: Calibrate = None,
-           calibrate_head: CalibrateHead = False, smooth: Smooth = None, person: PersonName = None, json: Json = False,
-           quiet: Quiet = False) -> None:
+           source: Source = None, recorded_fps: RecordedRate = None, face_id: FaceId = None,
+           calibrate: Calibrate = None, calibrate_head: CalibrateHead = False, smooth: Smooth = None,
+           person: PersonName = None, json: Json = False, quiet: Quiet = False) -> None:
     """Send a performance as a stream of less than 1 kbit/s.
 
     For example: facegen encode recording.csv -o talk.fgp
