@@ -14,11 +14,11 @@ import typer
 
 from facegen.cli.options import FaceName, Json, PersonName, Quiet, Size, View, print_json, read_size, read_view, warn
 from facegen.cli.picture import Detail, RendererName
+from facegen.cli.play import RecordedRate
 from facegen.cli.recordings import (
     Calibrate,
     CalibrateHead,
     FaceId,
-    RecordedRate,
     Smooth,
     Source,
     read_recording,
@@ -38,7 +38,7 @@ Recording = Annotated[Path, typer.Argument(
     metavar="IN", help="A recording (`facegen list formats`), or a clip (.yaml).")]
 Sink = Annotated[str, typer.Option(
     "--output", "-o", metavar="OUT", help="A file, - for a pipe, or udp://HOST:PORT.")]
-Rate = Annotated[float, typer.Option("--rate", metavar="N", help="Frames a second that are sent.")]
+Rate = Annotated[float, typer.Option("--fps", metavar="N", help="Frames a second that are sent.")]
 Quality = Annotated[float | None, typer.Option(
     "--quality", metavar="MM", help="Millimetres of the face's movement in a step: more is coarser. [default: 0.8]")]
 FramesEach = Annotated[int, typer.Option(
@@ -63,11 +63,11 @@ Wait = Annotated[int | None, typer.Option(
 Timeout = Annotated[float, typer.Option("--timeout", metavar="S", help="Seconds of silence after which UDP is over.")]
 
 
-def encode(recording: Recording, output: Sink = _PIPE, rate: Rate = 25.0, quality: Quality = None,
+def encode(recording: Recording, output: Sink = _PIPE, fps: Rate = 25.0, quality: Quality = None,
            frames: FramesEach = 16, key_every: KeyEvery = 1, parts: Parts = None, realtime: Realtime = False,
-           source: Source = None, fps: RecordedRate = None, face_id: FaceId = None, calibrate: Calibrate = None,
-           calibrate_head: CalibrateHead = False, smooth: Smooth = None, person: PersonName = None, json: Json = False,
-           quiet: Quiet = False) -> None:
+           source: Source = None, recorded_fps: RecordedRate = None, face_id: FaceId = None,
+           calibrate: Calibrate = None, calibrate_head: CalibrateHead = False, smooth: Smooth = None,
+           person: PersonName = None, json: Json = False, quiet: Quiet = False) -> None:
     """Send a performance as a stream of less than 1 kbit/s.
 
     For example: facegen encode recording.csv -o talk.fgp
@@ -84,15 +84,16 @@ def encode(recording: Recording, output: Sink = _PIPE, rate: Rate = 25.0, qualit
         from facegen.animation.script import load_clip
         from facegen.codec.sampled import clip_performance
 
-        performance = clip_performance(load_clip(recording, person=person), rate)
+        performance = clip_performance(load_clip(recording, person=person), fps)
         if not quiet:
             warn(performance.warnings)
     else:
-        performance = read_recording(recording, source=source, fps=fps, face_id=face_id, calibrate=calibrate,
-                                     calibrate_head=calibrate_head, smooth=smooth, quiet=quiet)
+        performance = read_recording(recording, source=source, fps=recorded_fps, face_id=face_id, calibrate=calibrate,
+                                     calibrate_head=calibrate_head, smooth=smooth, quiet=quiet,
+                                     rate="--recorded-fps")
     performance = in_order(performance)
     try:
-        encoder = encoder_for(performance, fps=rate, parts=_parts(parts), frames=frames, key_every=key_every,
+        encoder = encoder_for(performance, fps=fps, parts=_parts(parts), frames=frames, key_every=key_every,
                               quality=QUALITY if quality is None else quality)
     except InputError as error:
         raise InputError(_named(str(error))) from error
@@ -108,7 +109,7 @@ def encode(recording: Recording, output: Sink = _PIPE, rate: Rate = 25.0, qualit
         print(f"{output}: {encoder.frames_taken} frames in {count} bytes, {8 * count / seconds:.0f} bit/s",
               file=sys.stderr)
     if json:
-        print_json({"output": output, "frames": encoder.frames_taken, "rate": float(encoder.dictionary.rate),
+        print_json({"output": output, "frames": encoder.frames_taken, "fps": float(encoder.dictionary.rate),
                     "bytes": count, "bits_per_second": 8 * count / seconds, "names": list(encoder.dictionary.names),
                     "parts": list(encoder.dictionary.parts), "warnings": [*performance.warnings, *encoder.told()]})
 
@@ -184,7 +185,7 @@ def decode(source: Incoming = _PIPE, output: Outputs = None, target: Target = No
 
 def _named(message: str) -> str:
     """Return an error of the encoder with the option's name before it."""
-    names = {"fps": "--rate", "quality": "--quality", "frames": "--frames", "key_every": "--key-every",
+    names = {"fps": "--fps", "quality": "--quality", "frames": "--frames", "key_every": "--key-every",
              "parts": "--parts"}
     name, colon, rest = message.partition(":")
     return f"{names[name]}{colon}{rest}" if name in names else message

@@ -55,7 +55,7 @@ def test_there_and_back(run, tmp_path, script):
     told = json.loads(text)
     assert code == 0
     assert err.endswith("bit/s\n")
-    assert (told["frames"], told["rate"], told["parts"]) == (20, 25, ["head", "gaze"])
+    assert (told["frames"], told["fps"], told["parts"]) == (20, 25, ["head", "gaze"])
     assert told["bytes"] == out.stat().st_size < 300
     assert out.read_bytes().startswith(MAGIC)
     code, text, err = run("decode", out, "-o", back, "--json")
@@ -99,7 +99,7 @@ def test_pipes(run, monkeypatch, tmp_path, script, stream):
 def test_pictures_and_a_film(run, tmp_path):
     script, stream = tmp_path / "short.yaml", tmp_path / "short.fgp"
     script.write_text("keyframes:\n  - {t: 0, pose: '0'}\n  - {t: 0.3, pose: happiness}\n")
-    run("encode", script, "-o", stream, "--rate", 10, "-q")
+    run("encode", script, "-o", stream, "--fps", 10, "-q")
     frames, film = tmp_path / "frames", tmp_path / "film.gif"
     assert run("decode", stream, "--render", frames, "-q", *QUICK) == (0, "", "")
     assert [path.name for path in sorted(frames.iterdir())] == [f"frame_{k:05d}.png" for k in range(1, 4)]
@@ -131,7 +131,7 @@ def test_what_was_lost_is_said(run, tmp_path, stream):
     (["encode", "{script}", "-o", "{folder}/x.fgp", "--quality", "0"], "--quality: expected a number in 0.02..20"),
     (["encode", "{script}", "-o", "{folder}/x.fgp", "--frames", "99"], "--frames: expected 1..64"),
     (["encode", "{script}", "-o", "{folder}/x.fgp", "--key-every", "0"], "--key-every: expected packets"),
-    (["encode", "{script}", "-o", "{folder}/x.fgp", "--rate", "0"], "fps: expected frames a second"),
+    (["encode", "{script}", "-o", "{folder}/x.fgp", "--fps", "0"], "fps: expected frames a second"),
     (["encode", "{script}", "-o", "{folder}/x.fgp", "--parts", "head,gase"], "did you mean 'gaze'"),
     (["encode", "{script}", "-o", "{folder}/x.fgp", "--parts", "place"], "--parts: the performance has no place"),
     (["encode", "{script}", "--json"], "--json: stdout carries the stream"),
