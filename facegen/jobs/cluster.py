@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import socket
 import time
 from collections.abc import Callable
 from concurrent.futures import Future
@@ -13,7 +14,9 @@ from facegen.errors import InputError
 WAIT = 5.0
 """Seconds to wait for a scheduler, and for its first worker."""
 
-_ADDRESS = re.compile(r"([a-z+]+://)?[^\s/]+:[0-9]{1,5}/?")
+_ADDRESS = re.compile(r"(?:(?P<by>tcp|tls|ucx|ucxx|ws|wss)://)?\[?(?P<host>[^\s/\[\]]+)\]?:(?P<port>[0-9]{1,5})/?")
+_LAST_PORT = 65_535
+_AGAIN = 0.1        # seconds between two looks for a scheduler
 _RECOUNT = 5.0      # seconds after which workers are counted again: they may join and leave while the work runs
 
 
@@ -24,18 +27,23 @@ def connect(address: str, *, wait: float | None = None) -> Cluster:
     distributed is not installed, nothing answers, or no worker is there.
     """
     wait = WAIT if wait is None else wait
-    if not _ADDRESS.fullmatch(address):     # distributed would look for it for a while, and then leave loose ends
+    found = _ADDRESS.fullmatch(address)
+    if not found or int(found["port"]) > _LAST_PORT:
         raise InputError(f"scheduler: expected an address such as tcp://10.0.0.7:8786, got {address!r}")
     try:
         from distributed import Client
     except ImportError as error:
         raise InputError("scheduler: a cluster needs dask.distributed, which is not installed: "
                          "pip install \"facegen[cluster]\"") from error
+    silent = (f"scheduler: nothing answers at {address} (waited {wait:g} s); `dask scheduler` starts one and prints "
+              "its address")
+    # A client that finds nobody stays half made; thrown away at a bad moment, it waits for itself for ever.
+    if found["by"] in (None, "tcp", "tls") and not _answers(found["host"], int(found["port"]), wait):
+        raise InputError(silent)
     try:
         client = Client(address, timeout=wait, set_as_default=False)
     except (OSError, TimeoutError) as error:
-        raise InputError(f"scheduler: nothing answers at {address} (waited {wait:g} s); `dask scheduler` starts one "
-                         "and prints its address") from error
+        raise InputError(silent) from error
     except (ValueError, TypeError) as error:
         raise InputError(f"scheduler: expected an address such as tcp://10.0.0.7:8786, got {address!r}: {error}"
                          ) from error
@@ -46,6 +54,19 @@ def connect(address: str, *, wait: float | None = None) -> Cluster:
         raise InputError(f"scheduler: {address} has no workers (waited {wait:g} s); `dask worker {address}` starts one"
                          ) from error
     return Cluster(client)
+
+
+def _answers(host: str, port: int, wait: float) -> bool:
+    """Return whether anything listens there within so many seconds."""
+    deadline = time.monotonic() + wait
+    while (left := deadline - time.monotonic()) > 0:
+        try:
+            socket.create_connection((host, port), timeout=left).close()
+        except OSError:
+            time.sleep(min(_AGAIN, left))
+        else:
+            return True
+    return False
 
 
 class Cluster:
