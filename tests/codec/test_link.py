@@ -6,6 +6,7 @@ import io
 import random
 import socket
 import threading
+from itertools import count
 
 import numpy as np
 import pytest
@@ -165,7 +166,8 @@ def test_a_receiver_can_be_stopped():
                 udp.sendto(one, ("127.0.0.1", port))
         asked.set()
 
-    again, _ = received(send, timeout=60.0, stopped=asked.is_set)
+    looks = count()             # what was sent is taken in before
+    again, _ = received(send, timeout=60.0, stopped=lambda: asked.is_set() and next(looks) >= 10)
     assert len(again) in (16, 32)
 
 
