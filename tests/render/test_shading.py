@@ -108,7 +108,7 @@ def test_srgb_table_is_the_standards_curve_to_a_level():
 
 def test_every_material_of_a_face_is_there_and_brighter_light_never_darkens():
     assert {"skin", "lips", "brows", "sclera", "iris", "pupil", "teeth", "gums", "limbus", "nostril", "tongue",
-            "mouth", "hair", "lashes"} == set(MATERIALS)
+            "mouth", "hair", "lashes", "flesh"} == set(MATERIALS)
     mesh = sphere()
     camera = frame(mesh.vertices, size=(64, 64))
     ids, pixel, _ = ids_at(camera, mesh)
