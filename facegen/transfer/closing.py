@@ -66,14 +66,14 @@ class _Wanted:
 @dataclass(frozen=True, eq=False)
 class Closing:
     """How one slit of an avatar is closed: built once, for the template's k shapes. ``margins`` and ``field`` are the
-    avatar's, ``rest`` (n, 3) its skin, ``eye`` what its lids lie on."""
+    avatar's, ``rest`` (n, 3) and ``faces`` (m, 3) its skin, ``eye`` what its lids lie on."""
 
     margins: Margins
     field: Field
     rest: Array
+    faces: NDArray[np.int32]
     eye: EyeFront | None
     wanted: _Wanted
-    faces: NDArray = None
 
     def closes(self) -> NDArray[np.bool_]:
         """Return which shapes (k,) shut the slit."""
@@ -176,7 +176,7 @@ def closing(skin: Skin, slit: Slit, eye: EyeFront | None = None) -> Closing | No
     told = _told_lips if slit is LIPS else _told_lids
     upper, lower = (np.stack([edge @ one for one in template.motion]) for edge in (own.upper, own.lower))
     wanted = told(own.gap(template.surface.vertices), upper, lower, margins.gap(rest), skin.parts.matrices[slit.name])
-    return Closing(margins, closing_field(skin, own, margins), rest, eye, wanted, skin.surface.faces)
+    return Closing(margins, closing_field(skin, own, margins), rest, skin.surface.faces, eye, wanted)
 
 
 def _told_lips(gap: Array, upper: Array, lower: Array, own_gap: Array, part: Array) -> _Wanted:

@@ -66,6 +66,12 @@ class FaceMeasures:
         up = np.cross(-back, [1.0, 0.0, 0.0])
         return up / max(np.linalg.norm(up), 1e-300)
 
+    @cached_property
+    def mouth_axes(self) -> Array:
+        """The mouth's axes in rows (3, 3): to the subject's left, up (`lip_normal`), and out."""
+        left = np.array([1.0, 0.0, 0.0])
+        return np.stack([left, self.lip_normal, np.cross(left, self.lip_normal)])
+
     def eye(self, s: str) -> Array:
         """The middle (3,) of an eye's opening."""
         return np.mean([self.points[f"eye_{name}_{s}"] for name in ("inner", "outer", "upper", "lower")], axis=0)

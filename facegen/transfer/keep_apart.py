@@ -219,8 +219,7 @@ class _Lips:
     def __init__(self, pieces: PieceMotion) -> None:
         face = pieces.face
         self._rest, self._height = pieces.vertices, face.height
-        up = face.lip_normal
-        self._axes = np.stack([[1.0, 0.0, 0.0], up, np.cross([1.0, 0.0, 0.0], up)])     # right, up, out of the mouth
+        self._axes = face.mouth_axes
         corners = pieces.skin.corners @ self._axes.T
         middles = corners.mean(axis=1)
         near = np.linalg.norm(middles - self._axes @ face.lips, axis=1) < _LIP_REACH * face.height

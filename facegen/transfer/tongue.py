@@ -37,7 +37,7 @@ class Tongue:
         active = np.flatnonzero(np.abs(self.motion).max(axis=(1, 2), initial=0.0) > _TINY)
         if not len(active) or not len(at):
             return result
-        own, axes = _axes(self.face), _axes(face)
+        own, axes = self.face.mouth_axes, face.mouth_axes
         here, there = self.surface.vertices @ own.T, np.asarray(at, float) @ axes.T
         size, other = (np.maximum(np.ptp(one, axis=0), _TINY) for one in (here, there))
         box = Surface((here - here.min(axis=0)) / size, self.surface.faces)
@@ -54,15 +54,9 @@ class Tongue:
 
     def comes_out(self) -> Array:
         """Return how far before the lips the tongue comes in each shape (k,), mm; 0 where it stays behind them."""
-        out = _axes(self.face)[2]
+        out = self.face.mouth_axes[2]
         tip = (self.surface.vertices + self.motion) @ out
         return np.maximum(tip.max(axis=1) - self.face.lips @ out, 0.0)
-
-
-def _axes(face: FaceMeasures) -> Array:
-    """Return the mouth's axes in rows (3, 3): to the subject's left, up, and out."""
-    up = face.lip_normal
-    return np.stack([[1.0, 0.0, 0.0], up, np.cross([1.0, 0.0, 0.0], up)])
 
 
 def _farther(way: Array, behind: float, gap: float) -> Array:
