@@ -1,0 +1,1 @@
+"""The studio: shape a face and rig an avatar in the browser."""
