@@ -21,6 +21,7 @@ from facegen.errors import InputError
 from facegen.geometry.ahead import ahead
 from facegen.geometry.normals import vertex_normals
 from facegen.geometry.operators import Surface
+from facegen.progress import Progress, counted, silent
 from facegen.transfer.eyeball import Eyeball, gaze_rotation
 from facegen.transfer.piece_motion import PieceMotion
 
@@ -70,7 +71,8 @@ class Contact:
 
 def keep_apart(pieces: PieceMotion, motion: ArrayLike,
                gaze: ArrayLike | None = None, *,
-               allowed: Mapping[str, ArrayLike] | None = None) -> tuple[Array, dict[str, Contact]]:
+               allowed: Mapping[str, ArrayLike] | None = None, progress: Progress = silent
+               ) -> tuple[Array, dict[str, Contact]]:
     """Return displacements (k, n, 3) in which nothing pokes through, and what was measured: "eye_L", "teeth_upper"...
 
     motion (k, n, 3): of all vertices, as `PieceMotion.move` gives, mm. gaze (k, 4): as given there.
@@ -85,17 +87,19 @@ def keep_apart(pieces: PieceMotion, motion: ArrayLike,
     spread = _Spread(pieces.skin)
     deep = {name: np.broadcast_to(np.asarray(mm, float), len(motion)) for name, mm in (allowed or {}).items()}
     none = np.zeros(len(motion))
-    found = {}
-    for s, ball in pieces.eyes.items():
-        if ball.slide is None:          # a disc has no inside
+    found, lips = {}, _Lips(pieces)
+    balls = {f"eye_{s}": (s, ball) for s, ball in pieces.eyes.items() if ball.slide is None}  # a disc has no inside
+    behind = [kind for kind in ("teeth_upper", "teeth_lower", "tongue") if len(pieces.rows(kind))]
+    for name in counted(progress, "keeping eyes and teeth behind the skin", [*balls, *behind, "mouth"]):
+        if name in balls:
+            s, ball = balls[name]
             own = angles[:, :2] if s == "L" else angles[:, 2:]
             turn = gaze_rotation(own[:, 0], own[:, 1], ball.azimuth)
-            found[f"eye_{s}"] = _Lids(pieces, s, ball).part(motion, turn, deep.get(f"eye_{s}", none), spread)
-    lips = _Lips(pieces)
-    for kind in ("teeth_upper", "teeth_lower", "tongue"):
-        if len(own := pieces.rows(kind)):
-            found[kind] = lips.part(motion, own, deep.get(kind, none), spread)
-    found["mouth"] = lips.lining(motion, pieces)
+            found[name] = _Lids(pieces, s, ball).part(motion, turn, deep.get(name, none), spread)
+        elif name in behind:
+            found[name] = lips.part(motion, pieces.rows(name), deep.get(name, none), spread)
+        else:
+            found[name] = lips.lining(motion, pieces)
     return motion, found
 
 

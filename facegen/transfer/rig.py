@@ -15,6 +15,7 @@ from facegen.errors import FileError, InputError, nearest
 from facegen.face.face import load_face
 from facegen.fileio.avatar import AvatarFile, check_output, load_avatar, save_avatar
 from facegen.fileio.kept import kept_in
+from facegen.progress import Progress, silent, within
 from facegen.transfer.halfway import half_name
 from facegen.transfer.landmarks import check_places, load_landmarks
 from facegen.transfer.pieces import describe
@@ -74,7 +75,7 @@ def rig(avatar: str | Path, output: str | Path, *, landmarks: str | Path | None 
         sets: Sequence[str] | None = None, shapes: Sequence[str] | None = None, person: str | Path | None = None,
         template: str | Path | None = None, template_landmarks: str | Path | None = None, method: str = "landmarks",
         weights: WeightsLike | None = None, opening: float = 1.0, pieces: Mapping[str, str] | None = None,
-        normals: bool = True, quantise: bool = False, cache: bool = True) -> Rigged:
+        normals: bool = True, quantise: bool = False, cache: bool = True, progress: Progress = silent) -> Rigged:
     """Give an avatar blendshapes and write it.
 
     avatar: the path of a .obj, .glb, .gltf, .vrm, .ply or .stl file, or a shipped avatar's name. output: .glb (or
@@ -83,12 +84,14 @@ def rig(avatar: str | Path, output: str | Path, *, landmarks: str | Path | None 
     habits override expressions. template, template_landmarks: another face that has shapes, instead of facegen's own
     and its sets, see `read_template`. method, opening, pieces: as in `transfer`; weights: as `read_weights`
     takes them. normals, quantise: as in `save_avatar`. cache: use again how the skin was laid on the template, kept in
-    the user's cache folder, if avatar, landmarks, pieces and template are the same. Raises InputError and its children;
-    nothing is written then. ::
+    the user's cache folder, if avatar, landmarks, pieces and template are the same. progress: called with what is being
+    done and the share that is behind, 0 to 1, before the file appears; what it raises stops the work. Raises InputError
+    and its children. Nothing is written when anything is raised. ::
 
         facegen.rig("cat.obj", "cat.glb", landmarks="cat.yaml")
         facegen.load_face("cat.glb").pose("happiness")
     """
+    progress("reading the avatar", 0.0)
     path, marks = avatar_files(avatar, landmarks)
     asked = _asked(sets, shapes, person, template, template_landmarks)
     chosen = read_weights(weights)
@@ -96,12 +99,15 @@ def rig(avatar: str | Path, output: str | Path, *, landmarks: str | Path | None 
     check_output(source, output, asked.sets)
     places = load_landmarks(marks, source.mesh, mesh_name=path.name, digest=source.digest)
     warnings = [*check_places(places, source.mesh), *_without_expressions(source, asked.sets)]
+    progress("making the shapes of the template", 0.05)
     found = transfer(source.mesh, places, asked.template(), method=method, weights=chosen, opening=opening,
-                     pieces=pieces, kept=kept_in("registrations") if cache else None)
+                     pieces=pieces, kept=kept_in("registrations") if cache else None,
+                     progress=within(progress, 0.15, 0.9))
     made = {name: found.shapes[name] for name in asked.sets}
     made |= {half_name(name): moved for name, moved in found.halves.items() if name in made}
     expressions = {name: {name: 1.0} for name, kind in asked.sets.items() if kind == "vrm"}
     notes = _notes(source, places.points(source.mesh.vertices), found, asked.sets)
+    progress("writing the avatar", 0.9)
     written = save_avatar(source, output, made, notes=notes, normals=normals, quantise=quantise,
                           expressions=expressions)
     return Rigged(written, tuple(made), (*warnings, *found.warnings), found,

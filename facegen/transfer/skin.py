@@ -18,6 +18,7 @@ from facegen.fileio.kept import Kept
 from facegen.geometry.closest import Feet
 from facegen.geometry.normals import vertex_normals
 from facegen.geometry.operators import Surface
+from facegen.progress import Progress, silent
 from facegen.transfer.baselines import PAPER, SUMNER, PaperWeights, expression_cloning, gradient_transfer
 from facegen.transfer.jaw import JawMotion, avatar_jaw, jaw_share
 from facegen.transfer.part_motion import MEMBERS, PartMotion, part_motion, spread
@@ -91,7 +92,8 @@ class Skin:
         return avatar_jaw(self.template.hinge, self.template.landmarks, self.landmarks, self.registered,
                           self.surface.vertices, self.jaw_share, opening=self.opening)
 
-    def motion(self, method: str = "landmarks", weights: Weights | PaperWeights | None = None) -> NDArray[np.float64]:
+    def motion(self, method: str = "landmarks", weights: Weights | PaperWeights | None = None, *,
+               progress: Progress = silent) -> NDArray[np.float64]:
         """Return the displacements (k, n, 3) of the template's shapes on this skin, mm."""
         template = self.template
         if method == "cloning":
@@ -104,7 +106,7 @@ class Skin:
             return gradient_transfer(self.surface, self.registered, template.surface, template.motion, weights=chosen,
                                      landmarks=places, landmark_motion=moved, root=method == "sumner")
         rest = self._without_jaw()
-        result = self._solver(weights or OURS, rest).solve(rest)[:, :len(self.surface.vertices)]
+        result = self._solver(weights or OURS, rest).solve(rest, progress=progress)[:, :len(self.surface.vertices)]
         if self.jaw is not None:
             for some in _blocks(len(result)):
                 turned = self.jaw.movement(self.surface.vertices, template.jaw[some])
@@ -180,7 +182,7 @@ class Skin:
 
 
 def lay_skin(template: Template, surface: Surface, places: Mapping[str, tuple[NDArray, NDArray]], *,
-             opening: float = 1.0, kept: Kept | None = None) -> Skin:
+             opening: float = 1.0, kept: Kept | None = None, progress: Progress = silent) -> Skin:
     """Return the avatar's skin laid on the template.
 
     surface: the skin in the template's frame, mm. places: its landmarks. kept: where registrations are found again and
@@ -196,7 +198,7 @@ def lay_skin(template: Template, surface: Surface, places: Mapping[str, tuple[ND
         names = [name for name in places if name in template.places]
         targets = np.array([template.landmarks[name] for name in names])
         registered = register(surface, sides, placing(places, names, len(surface.vertices)), targets,
-                              correspondence)
+                              correspondence, progress=progress)
         if key is not None:
             kept.keep(key, registered)
     return Skin(template, surface, places, sides, registered, correspondence, opening)

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from facegen.errors import InputError, nearest
 from facegen.fileio.kept import Kept
 from facegen.geometry.mesh import Mesh
+from facegen.progress import Progress, silent, within
 from facegen.transfer.alignment import Similarity, align
 from facegen.transfer.apart import take_apart
 from facegen.transfer.closing import closing
@@ -55,13 +56,15 @@ class Transferred:
 
 def transfer(mesh: Mesh, landmarks: Landmarks, template: Template, *, method: str = "landmarks",
              weights: AnyWeights | None = None, opening: float = 1.0,
-             pieces: Mapping[str, str] | None = None, kept: Kept | None = None) -> Transferred:
+             pieces: Mapping[str, str] | None = None, kept: Kept | None = None, progress: Progress = silent
+             ) -> Transferred:
     """Return the template's shapes on an avatar.
 
     mesh: the avatar, in any axes and units. landmarks: on it. method: "landmarks" (ours), or a published one to compare
     with: "sumner", "cloning". weights: of the energies, see `read_weights`; ours without. opening: a factor on how
     far the jaw opens. pieces: part, material or number of a component -> kind. kept: where registrations are kept
-    and found again. Raises InputError for what cannot be used: unknown names, a mesh that cannot be solved.
+    and found again. progress: called as `Progress` says. Raises InputError for what cannot be used: unknown names, a
+    mesh that cannot be solved.
     """
     if method not in METHODS:
         raise InputError(f"method: expected {', '.join(METHODS)}, got {method!r}{nearest(str(method), METHODS)}")
@@ -74,16 +77,19 @@ def transfer(mesh: Mesh, landmarks: Landmarks, template: Template, *, method: st
         raise InputError(f"mesh: {len(far)} of {len(mesh.vertices)} vertices lie beyond {_FARTHEST:g} (first: "
                          f"{', '.join(map(str, far[:5]))}); remove them or write the mesh in larger units")
     frame = align(landmarks.points(mesh.vertices), template.landmarks)
+    progress("telling the pieces apart", 0.0)
     parts = take_apart(mesh, landmarks, frame, explicit=pieces)
     vertices, found, rows = parts.vertices, parts.pieces, parts.rows
-    skin = lay_skin(template, parts.surface, parts.places(template.places), opening=opening, kept=kept)
-    on_skin = skin.motion(method, weights)
+    skin = lay_skin(template, parts.surface, parts.places(template.places), opening=opening, kept=kept,
+                    progress=within(progress, 0.05, 0.3))
+    on_skin = skin.motion(method, weights, progress=within(progress, 0.3, 0.6))
     contacts: Mapping[str, Contact] = {}
     notes = parts.skin.notes
     halves: Mapping[int, NDArray] = {}
     if method != "landmarks":
         motion = _among_all(on_skin, rows, len(vertices))
     else:
+        progress("closing lids and lips", 0.6)
         moved = PieceMotion(parts.solid, vertices, parts.skin.wound(parts.faces), parts.points)
         fronts = {f"eye_{s}": EyeFront(ball, vertices[moved.rows(f"eye_{s}")]) for s, ball in moved.eyes.items()}
         found_slits = {slit: closing(skin, slit, fronts.get(slit.name)) for slit in (*LIDS, LIPS)}
@@ -96,11 +102,13 @@ def transfer(mesh: Mesh, landmarks: Landmarks, template: Template, *, method: st
         motion = moved.move(_among_all(on_skin, rows, len(vertices)), jaw, template.gaze, tongue=template.tongue)
         # A tongue that comes out is before the lips, and is meant to be.
         out = {} if template.tongue is None else {"tongue": np.where(template.tongue.comes_out() > 0, np.inf, 0.0)}
-        motion, contacts = keep_apart(moved, motion, template.gaze, allowed=out)
+        motion, contacts = keep_apart(moved, motion, template.gaze, allowed=out,
+                                      progress=within(progress, 0.7, 0.95))
         if skin.copied:             # whatever pokes through it there
             motion[:, rows] = on_skin
         for slit in slits:
             slit.seal(motion, rows)
+        progress("bending lids round the eyes", 0.95)
         lids = [slit for slit in slits if slit.eye is not None]
         still = ~(template.jaw.any(axis=1) | template.gaze.any(axis=1))
         halves = halfway(moved, lids, rows, motion, still)
