@@ -214,7 +214,8 @@ class AvatarFace:
         """Return blendshape -> weight that makes coefficients of the unit table and a sum of raw data, as well as these
         shapes can, and the share of the movement that is lost. InputError if no shape's name is understood."""
         key = (tuple(members.items()), raw)
-        if key not in self._fitted:
+        found = self._fitted.get(key)           # once: another thread may clear it
+        if found is None:
             if not self.known:
                 raise InputError(f"face: none of the {len(self.shapes)} blendshapes of {self.path.name} has a name "
                                  "that is understood (units such as AU12_L, ARKit, visemes, VRM, expressions); "
@@ -222,8 +223,8 @@ class AvatarFace:
             fitted, lost = self._made_of.fitted(members, raw_movement(raw) if raw else None)
             if len(self._fitted) >= _KEPT:
                 self._fitted.clear()
-            self._fitted[key] = self._by_name(fitted), lost
-        return self._fitted[key]
+            self._fitted[key] = found = self._by_name(fitted), lost
+        return found
 
     def check(self, meaning: Resolution) -> tuple[str, ...]:
         """Return what to warn of: movement that these shapes cannot make, a head that cannot turn."""

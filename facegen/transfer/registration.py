@@ -26,6 +26,7 @@ from facegen.geometry.closest import ClosestPoints, Feet
 from facegen.geometry.factor import Factor
 from facegen.geometry.normals import vertex_normals
 from facegen.geometry.operators import Surface, dirichlet, hinge_energy
+from facegen.progress import Progress, counted, silent
 from facegen.transfer.sides import torn
 
 
@@ -117,7 +118,8 @@ class Correspondence:
 
 
 def register(surface: Surface, sides: NDArray, landmarks: sparse.csr_array, targets: NDArray,
-             correspondence: Correspondence, steps: tuple[Step, ...] = STEPS) -> NDArray[np.float64]:
+             correspondence: Correspondence, steps: tuple[Step, ...] = STEPS, *, progress: Progress = silent
+             ) -> NDArray[np.float64]:
     """Return the vertices (n, 3) of the avatar's skin in the template's shape.
 
     surface: the skin (n vertices, m triangles), in the template's frame, mm. sides (n, s): `side_fields`. landmarks
@@ -128,21 +130,21 @@ def register(surface: Surface, sides: NDArray, landmarks: sparse.csr_array, targ
     smooth, stay = hinge_energy(surface), dirichlet(surface)
     area = np.maximum(surface.vertex_areas, 1e-6 * surface.vertex_areas.mean())
     x, factor = surface.vertices.copy(), None
-    for step in steps:
-        for _ in range(step.repeat):
-            pull = np.zeros(n)
-            goal = x
-            if step.close:
-                feet = correspondence(x, vertex_normals(x, surface.faces), sides, reach=step.reach)
-                # Near the reach a partner counts less: one that comes and goes would make steps jump.
-                fade = np.where(feet.found, 1 - np.minimum(feet.distances / max(step.reach, 1e-9), 1) ** 2, 0.0)
-                pull, goal = step.close * area * fade, np.where(feet.found[:, None], feet.points, x)
-            energy = step.smooth * smooth + step.stay * stay
-            floor = 1e-9 * energy.diagonal().mean()
-            hold = _HOLD * energy.diagonal().max()
-            matrix = energy + sparse.diags_array(pull + floor) + hold * (landmarks.T @ landmarks)
-            right = pull[:, None] * (goal - surface.vertices)
-            right += hold * (landmarks.T @ (targets - landmarks @ surface.vertices))
-            factor = Factor(matrix, what="the registration of the avatar", spent=factor)
-            x = surface.vertices + factor.solve(right)
+    all_steps = [step for step in steps for _ in range(step.repeat)]
+    for step in counted(progress, "laying the skin on the template", all_steps):
+        pull = np.zeros(n)
+        goal = x
+        if step.close:
+            feet = correspondence(x, vertex_normals(x, surface.faces), sides, reach=step.reach)
+            # Near the reach a partner counts less: one that comes and goes would make steps jump.
+            fade = np.where(feet.found, 1 - np.minimum(feet.distances / max(step.reach, 1e-9), 1) ** 2, 0.0)
+            pull, goal = step.close * area * fade, np.where(feet.found[:, None], feet.points, x)
+        energy = step.smooth * smooth + step.stay * stay
+        floor = 1e-9 * energy.diagonal().mean()
+        hold = _HOLD * energy.diagonal().max()
+        matrix = energy + sparse.diags_array(pull + floor) + hold * (landmarks.T @ landmarks)
+        right = pull[:, None] * (goal - surface.vertices)
+        right += hold * (landmarks.T @ (targets - landmarks @ surface.vertices))
+        factor = Factor(matrix, what="the registration of the avatar", spent=factor)
+        x = surface.vertices + factor.solve(right)
     return x

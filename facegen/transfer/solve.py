@@ -30,6 +30,7 @@ from facegen.geometry.closest import ClosestPoints, Feet
 from facegen.geometry.factor import Factor
 from facegen.geometry.fade import smooth_step
 from facegen.geometry.operators import Surface, dirichlet, hinge_energy
+from facegen.progress import Progress, counted, silent
 from facegen.transfer.part_motion import nearest_rotations
 
 # Gradients without a partner are zero with this share of the others' weight: they give way, but do not wrinkle.
@@ -123,11 +124,11 @@ class Transfer:
         columns = np.broadcast_to(columns[:, None], values.shape)
         return sparse.coo_array((values.ravel(), (rows.ravel(), columns.ravel())), shape=(3 * n, 3 * n_s)).tocsr()
 
-    def solve(self, motion: NDArray) -> NDArray[np.float64]:
+    def solve(self, motion: NDArray, *, progress: Progress = silent) -> NDArray[np.float64]:
         """Return the avatar's displacements (k, n, 3) for the template's (k, n_s, 3)."""
         n, n_s = self._shape
         result = np.empty((len(motion), n, 3))
-        for start in range(0, len(motion), _AT_A_TIME):
+        for start in counted(progress, "carrying the shapes over", range(0, len(motion), _AT_A_TIME)):
             some = motion[start:start + _AT_A_TIME]
             k = len(some)
             right = self._right @ np.ascontiguousarray(some.reshape(k, 3 * n_s).T)          # (3 n, k)

@@ -293,3 +293,23 @@ def test_other_wrong_faces(tmp_path):
     (tmp_path / "broken.glb").write_bytes(b"glTF")
     with pytest.raises(InputError, match=r"broken\.glb"):
         load_face(tmp_path / "broken.glb")
+
+
+def test_threads_may_pose_one_avatar(rig_of, monkeypatch):
+    """Pages of the studio share a face: what one thread throws from the memory of fits, another may be reading."""
+    from concurrent.futures import ThreadPoolExecutor
+
+
+    class Forgetful(dict):
+        def __setitem__(self, key, value):
+            super().__setitem__(key, value)
+            self.clear()                    # as if another thread had, at once
+
+    shared = AvatarFace(rig_of("units"))
+    poses = [f"AU12={k / 40!r}" for k in range(1, 9)]
+    expected = [shared.pose(one) for one in poses]
+    monkeypatch.setattr("facegen.face.avatar._KEPT", 1)
+    shared._fitted = Forgetful()
+    with ThreadPoolExecutor(4) as pool:
+        for got, right in zip(pool.map(shared.pose, poses), expected, strict=True):
+            assert np.array_equal(got, right)

@@ -1,0 +1,70 @@
+"""What all pages share: faces that are loaded, and where works are kept."""
+
+from __future__ import annotations
+
+import os
+import threading
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from facegen.errors import InputError, nearest
+from facegen.face.face import load_face
+from facegen.face.named import face_names
+from facegen.fileio.textfile import make_folder
+from facegen.studio.store import Store
+
+FACES = "faces"
+"""Folder of a work that holds its own rigged avatars."""
+
+_AVATARS = "avatars"
+
+
+class Desk:
+    """Safe to call from several threads; faces are shared, so nobody may change them.
+
+    folder: where works are kept. ``store``: the works.
+    """
+
+    def __init__(self, folder: str | os.PathLike[str]) -> None:
+        self.store = Store(make_folder(folder))
+        self._faces: dict[Path | str, Any] = {}
+        self._locks: dict[Path | str, threading.Lock] = {}
+        self._lock = threading.Lock()
+
+    def face_names(self, work: str) -> tuple[str, ...]:
+        """Return the faces that a page can show: shipped faces and avatars, and what was rigged there."""
+        from facegen.transfer.rig import avatar_names
+
+        own = self.store.folder / work / FACES
+        return (*face_names(), *avatar_names(), *sorted(path.name for path in own.glob("*.glb")))
+
+    def face(self, name: str, work: str, *, wait: Callable[[str], None] = lambda why: None) -> Any:
+        """Return a face by name, loaded once. A shipped avatar is rigged when it is first asked for.
+
+        wait: called with the reason, if it takes more than a moment. InputError for an unknown name.
+        """
+        if name not in self.face_names(work):
+            raise InputError(f"face: unknown face '{name}'{nearest(name, self.face_names(work))}")
+        own = self.store.folder / work / FACES / name
+        key = own if own.suffix == ".glb" else name
+        with self._lock:
+            lock = self._locks.setdefault(key, threading.Lock())
+        with lock:                              # who asks second waits and finds it
+            changed = own.stat().st_mtime_ns if key is own else None
+            found = self._faces.get(key)
+            if found is None or found[0] != changed:
+                self._faces[key] = found = changed, self._load(key, wait)
+        return found[1]
+
+    def _load(self, key: Path | str, wait: Callable[[str], None]) -> Any:
+        if isinstance(key, Path) or key in face_names():
+            return load_face(key)
+        from facegen.transfer.rig import rig
+
+        folder = make_folder(self.store.folder / _AVATARS)
+        path = folder / f"{key}.glb"
+        wait(f"{key} gets its blendshapes; the first time this takes a few seconds.")
+        # Made anew by each server: another version of facegen makes another.
+        rig(key, path, sets=["units", "arkit", "visemes"])
+        return load_face(path)

@@ -1,0 +1,19 @@
+"""The table workshop."""
+
+from __future__ import annotations
+
+from facegen.studio.page import Page
+from facegen.studio.work import Work
+
+
+class TablesPanel:
+    """The table workshop."""
+
+    def __init__(self, page: Page) -> None:
+        self.page = page
+
+    def refresh(self, work: Work) -> None:
+        """Show a work."""
+
+    def close(self) -> None:
+        """Nothing runs."""

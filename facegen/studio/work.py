@@ -1,0 +1,150 @@
+"""What a person makes on one page of the studio, as data: frozen, so that undoing is keeping the one before.
+
+Nothing here knows the browser. A :class:`Work` goes to a JSON file and comes back the same; each panel has a section of
+its own, and what a section holds is checked where it is made and again when a file is read.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field, fields, replace
+from typing import Any, Self
+
+from facegen.errors import InputError, TableError
+from facegen.facs.deformation import Deformation, deformation_from_dict
+from facegen.facs.expressions import Resolution, resolve
+from facegen.facs.notation import canonical
+from facegen.facs.validate import Entry
+
+VERSION = 1
+"""Of the file's form."""
+
+_FORM = "facegen_studio"
+
+
+@dataclass(frozen=True)
+class FaceWork:
+    """What the face shows.
+
+    rig: the name of a shipped face or avatar, or of what was opened on this page. person: whose habits, or None. units:
+    unit code -> weight 0..1, as a script gives them. blend: expression -> share 0..1 that ``units`` came from; empty as
+    soon as a unit is changed by hand. raw: movements on top, the form of a deformation file (docs/files.md). intensity:
+    0..1, of units and raw data alike.
+    """
+
+    rig: str = "akimoto"
+    person: str | None = None
+    units: Mapping[str, float] = field(default_factory=dict)
+    blend: Mapping[str, float] = field(default_factory=dict)
+    raw: Mapping[str, Any] = field(default_factory=dict)
+    intensity: float = 1.0
+
+    @property
+    def script(self) -> str:
+        """The units as a FACS script; "0" where there are none."""
+        return canonical(self.units)
+
+    @property
+    def deformation(self) -> Deformation:
+        """The raw movements, intensity not applied."""
+        return deformation_from_dict(self.raw) if self.raw else Deformation()
+
+    def meaning(self) -> Resolution:
+        """Return what a rig is to show."""
+        found = resolve(dict(self.units) or "neutral", intensity=self.intensity)
+        raw = self.deformation * self.intensity
+        return replace(found, more=(*found.more, raw)) if raw else found
+
+    def checked(self) -> Self:
+        """Return itself, or raise InputError for what no face can show."""
+        for name, share in self.blend.items():
+            Entry(share, "face", f"blend.{name}").number(0.0, 1.0)
+        self.meaning()
+        return self
+
+
+@dataclass(frozen=True)
+class ClipWork:
+    """The timeline: a clip's script as plain data (docs/clips.md), and how it is played."""
+
+    script: Mapping[str, Any] = field(default_factory=dict)
+    speed: float = 1.0
+    loop: bool = True
+
+    def checked(self) -> Self:
+        """Return itself, or raise InputError."""
+        return self
+
+
+@dataclass(frozen=True)
+class AvatarWork:
+    """An avatar on its way to blendshapes.
+
+    file: the name under which it was opened, or None. landmarks: name -> {"face": triangle, "barycentric": [a, b, c]},
+    what was clicked or confirmed. settings: of the rigging (opening, lid_closure, weights, sets).
+    """
+
+    file: str | None = None
+    landmarks: Mapping[str, Any] = field(default_factory=dict)
+    settings: Mapping[str, Any] = field(default_factory=dict)
+
+    def checked(self) -> Self:
+        """Return itself, or raise InputError."""
+        return self
+
+
+@dataclass(frozen=True)
+class TableWork:
+    """A person's table on its way to a file, as plain data (docs/tables.md)."""
+
+    person: Mapping[str, Any] = field(default_factory=dict)
+    units: Mapping[str, Any] = field(default_factory=dict)
+
+    def checked(self) -> Self:
+        """Return itself, or raise InputError."""
+        return self
+
+
+@dataclass(frozen=True)
+class Work:
+    """All of one page."""
+
+    face: FaceWork = field(default_factory=FaceWork)
+    clip: ClipWork = field(default_factory=ClipWork)
+    avatar: AvatarWork = field(default_factory=AvatarWork)
+    table: TableWork = field(default_factory=TableWork)
+
+    def plain(self) -> dict[str, Any]:
+        """Return it as what JSON can hold."""
+        return {_FORM: VERSION, **asdict(self)}
+
+    @classmethod
+    def read(cls, data: object, source: str = "work") -> Self:
+        """Return the work that `plain` gave; TableError names what is wrong and where."""
+        found = Entry(data, source).fields(required=(_FORM,), optional=_SECTIONS)
+        found.pop(_FORM).choice((str(VERSION),), "form of the studio's work")
+        return cls(**{name: _section(_SECTIONS[name], entry) for name, entry in found.items()})
+
+
+_SECTIONS = {"face": FaceWork, "clip": ClipWork, "avatar": AvatarWork, "table": TableWork}
+
+
+def _section(kind: Any, entry: Entry) -> Any:
+    """Return a section, each field of the type that it has when new."""
+    plain, values = kind(), {}
+    for name, one in entry.fields(optional=[each.name for each in fields(kind)]).items():
+        usual = getattr(plain, name)
+        if usual is None or isinstance(usual, str):
+            values[name] = None if usual is None and one.value is None else one.text()
+        elif isinstance(usual, bool):
+            values[name] = one.flag()
+        elif isinstance(usual, float):
+            values[name] = one.number()
+        else:
+            values[name] = {key: each.value for key, each in one.items()}
+    try:
+        return kind(**values).checked()
+    except TableError:
+        raise
+    except InputError as error:
+        raise entry.fail(str(error)) from error

@@ -1,0 +1,98 @@
+"""viser's handles without a browser: what is set is kept, and a person is played by `press` and `enter`."""
+
+from __future__ import annotations
+
+import contextlib
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+
+
+class Handle:
+    """Any handle: all keywords become attributes; a container where one is asked for."""
+
+    def __init__(self, kind: str, **values: Any) -> None:
+        self.kind, self.removed, self._calls = kind, False, []
+        self.__dict__.update(values)
+
+    def on_update(self, call):
+        self._calls.append(call)
+        return call
+
+    on_click = on_upload = on_drag = on_drag_start = on_drag_end = on_drag_update = on_update
+
+    def enter(self, value: Any) -> None:
+        """Do as a person who enters a value."""
+        self.__dict__["value"] = value
+        self.press()
+
+    def press(self, **event: Any) -> None:
+        """Do as a person who presses it."""
+        for call in self._calls:
+            call(SimpleNamespace(client=self, target=self, **event))
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        return None
+
+    def add_tab(self, title, *_):
+        return Handle("tab", label=title)
+
+    def remove(self):
+        self.removed = True
+
+
+class Maker:
+    """A scene or GUI: every ``add_x(label, ...)`` makes a handle and keeps it in ``made``."""
+
+    def __init__(self) -> None:
+        self.made: list[Handle] = []
+        self.main_panel = SimpleNamespace(dock_right=lambda: None)
+
+    def __getattr__(self, name: str) -> Any:
+        if name.startswith("add_"):
+            return lambda *values, **named: self._add(name[4:], values, named)
+        return lambda *_, **__: None
+
+    def _add(self, kind: str, values: tuple, named: dict) -> Handle:
+        named = dict(named)
+        if values:
+            named["label"] = values[0]
+        if kind == "mesh_simple":
+            named.update(vertices=np.asarray(values[1]), faces=np.asarray(values[2]), visible=True)
+        elif kind == "slider":
+            named.update(zip(("min", "max", "step", "initial_value"), values[1:], strict=False))
+        elif len(values) > 1:
+            named.setdefault("initial_value", values[1])
+        if "initial_value" in named:
+            named["value"] = named.pop("initial_value")
+        made = Handle(kind, **named)
+        self.made.append(made)
+        return made
+
+    def find(self, label: str) -> Handle:
+        """Return the one handle of a label that is not removed."""
+        found, = (one for one in self.made if getattr(one, "label", None) == label and not one.removed)
+        return found
+
+
+class FakeClient:
+    """What `Page` asks of a ClientHandle; ``notices``: what the person was told."""
+
+    def __init__(self) -> None:
+        self.scene, self.gui = Maker(), Maker()
+        self.camera = SimpleNamespace()
+        self.notices: list[tuple[str, str]] = []
+
+    def add_notification(self, title, body, **named):
+        self.notices.append((title, body))
+        return Handle("notice", title=title, body=body, **named)
+
+    def atomic(self):
+        return contextlib.nullcontext()
+
+    def flush(self):
+        pass

@@ -1,0 +1,148 @@
+"""Works as data: to a file and back, what is refused, undo, autosave."""
+
+import json
+import stat
+from dataclasses import replace
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+import facegen
+from facegen.errors import FileError, InputError, TableError
+from facegen.studio.history import STEPS, TOGETHER, History
+from facegen.studio.store import Store
+from facegen.studio.work import FaceWork, Work
+
+weights = st.floats(0.0, 1.0, allow_subnormal=False)
+
+
+@given(st.dictionaries(st.sampled_from(["1", "L2", "R12", "26", "43"]), weights), weights,
+       st.dictionaries(st.sampled_from(["jaw_unused", "open"]).filter(lambda key: key == "open"),
+                       st.floats(-20, 20, allow_subnormal=False)))
+def test_a_work_comes_back_from_json_as_it_was(units, intensity, jaw):
+    raw = {"units": "millimetre", "jaw": jaw, "points": {"mouth_corner_L": [1.5, 0.0, -2.0]}}
+    work = Work(face=FaceWork(units=units, intensity=intensity, raw=raw, person="mika").checked())
+    assert Work.read(json.loads(json.dumps(work.plain()))) == work
+
+
+@pytest.mark.parametrize(("change", "said"), [
+    ({"facegen_studio": 2}, "form of the studio's work '2'"),
+    ({"face": {"rig": 3}}, "face.rig: expected a text"),
+    ({"face": {"units": {"99": 1.0}}}, "there is no unit 99"),
+    ({"face": {"units": {"12": 1.5}}}, "12"),
+    ({"face": {"blend": {"happiness": float("nan")}}}, "blend.happiness"),
+    ({"face": {"intensity": 2}}, "intensity: expected a number in 0..1"),
+    ({"face": {"raw": {"jaw": {"opn": 1}}}}, "did you mean|unknown"),
+    ({"face": {"colour": 1}}, "unknown key 'colour'"),
+    ({"clip": {"loop": 1}}, "clip.loop: expected true or false"),
+    ({"extra": {}}, "unknown key 'extra'"),
+])
+def test_what_is_no_work_is_refused_by_name(change, said):
+    with pytest.raises(TableError, match=said):
+        Work.read({**Work().plain(), **change})
+
+
+def test_raw_movements_come_on_top_of_units_and_intensity_scales_both():
+    face = facegen.load_face()
+    work = FaceWork(units={"12": 0.8}, raw={"units": "millimetre", "points": {"brow_inner_L": [0.0, 4.0, 0.0]}})
+    both, units = face.pose(work.meaning()), face.pose("AU12=0.8")
+    moved = abs(both - units).max(axis=1) > 0.1
+    assert 20 < moved.sum() < len(both) / 2
+    half = replace(work, intensity=0.5)
+    expected = face.pose("AU12=0.4") + (both - units) / 2
+    assert face.pose(half.meaning()) == pytest.approx(expected, abs=0.02)
+    assert (face.pose(FaceWork().meaning()) == face.mesh().vertices).all()
+
+
+def smiling(weight):
+    return Work(face=FaceWork(units={"12": weight}))
+
+
+def test_undo_and_redo_walk_through_all_steps_and_a_new_change_forgets_the_redone():
+    history = History(Work())
+    for weight in (0.1, 0.2, 0.3):
+        assert history.change(f"to {weight}", smiling(weight))
+    assert not history.change("nothing", smiling(0.3))
+    assert history.undoes == "to 0.3"
+    assert [history.undo() for _ in range(4)] == [smiling(0.2), smiling(0.1), Work(), Work()]
+    assert history.undoes is None
+    assert history.redo() == smiling(0.1)
+    assert history.redoes == "to 0.2"
+    history.change("elsewhere", smiling(0.9))
+    assert history.redoes is None
+    assert history.redo() == smiling(0.9)
+
+
+def test_a_drag_is_one_step_and_a_pause_ends_it():
+    now = [0.0]
+    history = History(Work(), clock=lambda: now[0])
+    for weight in (0.1, 0.2, 0.3):
+        history.change("smile", smiling(weight), thing="12")
+        now[0] += 0.9 * TOGETHER
+    now[0] += TOGETHER
+    history.change("smile", smiling(0.4), thing="12")
+    history.change("brows", replace(smiling(0.4), face=FaceWork(units={"1": 1.0})), thing="1")
+    assert [history.undo() for _ in range(3)] == [smiling(0.4), smiling(0.3), Work()]
+
+
+def test_history_does_not_grow_without_end():
+    history = History(Work())
+    for k in range(STEPS + 50):
+        history.change(str(k), smiling(k / 1000))
+    for _ in range(STEPS):
+        history.undo()
+    assert history.undoes is None
+    assert history.work == smiling(0.049)
+
+
+def test_a_store_finds_works_again_after_a_crash(tmp_path):
+    store = Store(tmp_path / "works")
+    assert store.load("one") == (Work(), None)
+    for weight in (0.1, 0.2, 0.3):
+        store.save("one", smiling(weight))
+    assert store.load("one") == (smiling(0.3), None)                # what waits is what is
+    store.save("two", smiling(0.9))
+    store.flush()
+    again = Store(tmp_path / "works")                               # another process
+    assert again.load("one") == (smiling(0.3), None)
+    assert again.load("two") == (smiling(0.9), None)
+    assert stat.S_IMODE((tmp_path / "works" / "one").stat().st_mode) == 0o700
+    assert not list(tmp_path.rglob("*.part"))
+
+
+def test_a_change_is_saved_by_itself(tmp_path):
+    store = Store(tmp_path)
+    store.save("one", smiling(0.5))
+    store._timer.join(10)
+    assert Store(tmp_path).load("one") == (smiling(0.5), None)
+
+
+@pytest.mark.parametrize("text", ["{", '{"facegen_studio": 9}', "[]", ""])
+def test_an_unreadable_work_is_set_aside_and_told(tmp_path, text):
+    store = Store(tmp_path)
+    path = store.folder_of("one") / "work.json"
+    path.write_text(text)
+    work, told = store.load("one")
+    assert work == Work()
+    assert "set aside" in told
+    store.save("one", smiling(0.2))
+    store.flush()
+    assert [aside.read_text() for aside in path.parent.glob("*.unreadable")] == [text]
+    assert store.load("one") == (smiling(0.2), None)
+
+
+def test_a_work_that_cannot_be_saved_is_told(tmp_path):
+    store, said = Store(tmp_path), []
+    store.on_failure(lambda name, error: said.append((name, error)))
+    (tmp_path / "one").write_text("a file where the folder should be")
+    store.save("one", smiling(0.5))
+    store.flush()
+    (name, error), = said
+    assert name == "one"
+    assert isinstance(error, FileError)
+
+
+def test_a_section_checks_itself():
+    with pytest.raises(InputError, match="no unit"):
+        FaceWork(units={"99": 1.0}).checked()
