@@ -12,6 +12,7 @@ from typing import Any, Self
 
 from facegen.errors import InputError, TableError
 from facegen.facs.deformation import Deformation, deformation_from_dict
+from facegen.facs.expression_table import Person
 from facegen.facs.expressions import Resolution, resolve
 from facegen.facs.notation import canonical
 from facegen.facs.validate import Entry
@@ -26,7 +27,8 @@ _FORM = "facegen_studio"
 class FaceWork:
     """What the face shows.
 
-    rig: the name of a shipped face or avatar, or of what was opened on this page. person: whose habits, or None. units:
+    rig: the name of a shipped face or avatar, or of what was opened on this page. person: whose habits, a shipped
+    person's name or that of a file of the work's own (`Desk.people`), or None. units:
     unit code -> weight 0..1, as a script gives them. blend: expression -> share 0..1 that ``units`` came from; empty as
     soon as a unit is changed by hand. raw: movements on top, the form of a deformation file (docs/files.md). intensity:
     0..1, of units and raw data alike.
@@ -49,9 +51,9 @@ class FaceWork:
         """The raw movements, intensity not applied."""
         return deformation_from_dict(self.raw) if self.raw else Deformation()
 
-    def meaning(self) -> Resolution:
-        """Return what a rig is to show."""
-        found = resolve(dict(self.units) or "neutral", intensity=self.intensity)
+    def meaning(self, person: Person | None = None) -> Resolution:
+        """Return what a rig is to show. person: who ``person`` is (`Desk.person`); their units move their way."""
+        found = resolve(dict(self.units) or "neutral", person=person, intensity=self.intensity)
         raw = self.deformation * self.intensity
         return replace(found, more=(*found.more, raw)) if raw else found
 
