@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -12,6 +14,7 @@ import numpy as np
 from facegen.errors import FileError, InputError
 from facegen.fileio.avatar import AvatarFile, load_avatar
 from facegen.fileio.textfile import make_folder, whole_file
+from facegen.studio.limits import MEBIBYTE, Limits
 from facegen.transfer.rig import avatar_files, avatar_names
 
 FOLDER = "avatar"
@@ -19,11 +22,8 @@ FOLDER = "avatar"
 
 TAKEN = (".obj", ".glb", ".vrm", ".ply", ".stl", ".gltf")
 
-LARGEST = 100 * 2**20
-"""Bytes of a file. Because avatars with pictures on them have tens of megabytes."""
-
-MOST_TRIANGLES = 300_000
-"""Because a browser draws, and a click is found on, so many without a wait; an avatar for games has a tenth of it."""
+LIMITS = Limits()
+"""What is taken at most. An avatar for games has a tenth of the triangles."""
 
 _UNSAFE = re.compile(r"[^\w.-]+")
 _LONGEST = 60
@@ -69,22 +69,29 @@ def keep(folder: Path, name: str, content: bytes) -> str:
     It is read before it is kept: what cannot be opened leaves what was there as it was.
     """
     name = safe_name(name)
-    if len(content) > LARGEST:
-        raise InputError(f"file: '{name}' has {len(content) / 2**20:.0f} MB, the studio takes up to "
-                         f"{LARGEST / 2**20:.0f}; leave out pictures and clothes, or use the command facegen rig")
+    if len(content) > LIMITS.file_bytes:
+        raise InputError(f"file: '{name}' has {len(content) / MEBIBYTE:.0f} MB, the studio takes up to "
+                         f"{LIMITS.file_bytes / MEBIBYTE:.0f}; leave out pictures and clothes, or use the command facegen rig")
     place = make_folder(folder / FOLDER)
     with whole_file(place / name, "the avatar ") as draft:
         trial = draft.with_suffix(Path(name).suffix)            # readers go by it
         try:
             trial.write_bytes(content)
-            try:
+            with called(trial, name):
                 _check(load_avatar(trial), name)
-            except InputError as error:
-                raise type(error)(str(error).replace(str(trial), name)) from None
             trial.replace(draft)
         finally:
             trial.unlink(missing_ok=True)
     return name
+
+
+@contextmanager
+def called(path: Path, name: str) -> Iterator[None]:
+    """Have errors say a file's own name instead of where it is kept."""
+    try:
+        yield
+    except InputError as error:
+        raise InputError(str(error).replace(str(path), name)) from None
 
 
 def open_avatar(folder: Path, name: str) -> Opened:
@@ -109,8 +116,8 @@ def _check(avatar: AvatarFile, name: str) -> None:
     mesh = avatar.mesh
     if not len(mesh.faces):
         raise InputError(f"'{name}' has no triangles: there is nothing to put a face on")
-    if len(mesh.faces) > MOST_TRIANGLES:
-        raise InputError(f"'{name}' has {len(mesh.faces):,} triangles, the studio takes up to {MOST_TRIANGLES:,}; make "
+    if len(mesh.faces) > LIMITS.triangles:
+        raise InputError(f"'{name}' has {len(mesh.faces):,} triangles, the studio takes up to {LIMITS.triangles:,}; make "
                          "fewer of them first (in Blender: the Decimate modifier), or use the command facegen rig")
     used = mesh.vertices[np.unique(mesh.faces)]
     bad = int((~np.isfinite(used).all(axis=1)).sum())

@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import Any
 
 from facegen.face.landmarks import REQUIRED
-from facegen.fileio.textfile import save_text
+from facegen.fileio.textfile import make_folder, save_text
 from facegen.studio import picking
-from facegen.studio.avatar_file import FOLDER, TAKEN, keep
+from facegen.studio.avatar_file import FOLDER, TAKEN, called, keep, open_avatar
 from facegen.studio.avatar_scene import AvatarScene
 from facegen.studio.page import Page
 from facegen.studio.picker_view import PickerView
@@ -114,8 +114,6 @@ class AvatarPanel:
 
     def _facing(self, avatar: AvatarWork) -> AvatarWork:
         """Return the work with the axes that a file is known to have: VRM 0.x avatars look to -z."""
-        from facegen.studio.avatar_file import open_avatar
-
         return replace(avatar, front="-z") if open_avatar(self.folder, avatar.file).avatar.is_vrm0 else avatar
 
     def _turned(self) -> None:
@@ -131,10 +129,11 @@ class AvatarPanel:
 
     def _load_landmarks(self) -> None:
         given, mesh = self._load.value, self.scene.mesh
-        path = self.folder / FOLDER / "landmarks.yaml"
+        path = make_folder(self.folder / FOLDER) / "landmarks.yaml"
         save_text(given.content.decode("utf-8", "replace"), path)
         opened = self.scene.opened
-        found = load_landmarks(path, mesh, mesh_name=opened.path.name, digest=opened.avatar.digest)
+        with called(path, given.name):
+            found = load_landmarks(path, mesh, mesh_name=opened.path.name, digest=opened.avatar.digest)
         avatar = replace(self.page.work.avatar, landmarks=picking.as_places(found))
         self.page.change("load landmarks", avatar=avatar)
         self.page.say(f"{len(found.names)} points, all {len(REQUIRED)} that are needed among them.", "Landmarks loaded")

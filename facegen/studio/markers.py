@@ -31,9 +31,9 @@ class Mark:
 
 
 class Markers:
-    """The balls by landmark. dragged: called with the landmark and viser's event."""
+    """The balls by landmark. dragged: gives for a landmark what is called with viser's events of its ball."""
 
-    def __init__(self, scene: Any, dragged: Callable[[str, Any], None]) -> None:
+    def __init__(self, scene: Any, dragged: Callable[[str], Callable[[Any], None]]) -> None:
         self._scene, self._dragged = scene, dragged
         self._handles: dict[str, Any] = {}
         self.marks: dict[str, Mark] = {}
@@ -79,5 +79,5 @@ class Markers:
         handle = self._scene.add_icosphere(
             f"/landmarks/{name}", radius * SCALE, mark.colour, subdivisions=2, opacity=mark.opacity,
             position=tuple(mark.at), cast_shadow=False, receive_shadow=False)
-        handle.on_drag(lambda event: self._dragged(name, event))
+        handle.on_drag(self._dragged(name))
         return handle

@@ -42,7 +42,8 @@ class PickerView:
         self._reach = room_of("whole")[1]
         self._listens = False
         self._stamp: Any = None                 # what is shown
-        self.markers = Markers(page.client.scene, page.calls(self._dragged))
+        self.markers = Markers(
+            page.client.scene, lambda name: page.calls(lambda event: self._dragged(name, event)))
         self._thinking = Latest("proposals", page.fault)
         self._drawing = Latest("guide", page.fault)
         self._make(page.client.gui)

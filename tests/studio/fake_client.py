@@ -87,7 +87,7 @@ class Maker:
 
     def find(self, label: str) -> Handle:
         """Return the one handle of a label that is not removed."""
-        found, = (one for one in self.made if getattr(one, "label", None) == label and not one.removed)
+        found, = (one for one in self.made if str(getattr(one, "label", None)) == label and not one.removed)
         return found
 
 
