@@ -71,7 +71,8 @@ def keep(folder: Path, name: str, content: bytes) -> str:
     name = safe_name(name)
     if len(content) > LIMITS.file_bytes:
         raise InputError(f"file: '{name}' has {len(content) / MEBIBYTE:.0f} MB, the studio takes up to "
-                         f"{LIMITS.file_bytes / MEBIBYTE:.0f}; leave out pictures and clothes, or use the command facegen rig")
+                         f"{LIMITS.file_bytes / MEBIBYTE:.0f}; leave out pictures and clothes, or use the command "
+                         "facegen rig")
     place = make_folder(folder / FOLDER)
     with whole_file(place / name, "the avatar ") as draft:
         trial = draft.with_suffix(Path(name).suffix)            # readers go by it
@@ -117,8 +118,8 @@ def _check(avatar: AvatarFile, name: str) -> None:
     if not len(mesh.faces):
         raise InputError(f"'{name}' has no triangles: there is nothing to put a face on")
     if len(mesh.faces) > LIMITS.triangles:
-        raise InputError(f"'{name}' has {len(mesh.faces):,} triangles, the studio takes up to {LIMITS.triangles:,}; make "
-                         "fewer of them first (in Blender: the Decimate modifier), or use the command facegen rig")
+        raise InputError(f"'{name}' has {len(mesh.faces):,} triangles, the studio takes up to {LIMITS.triangles:,}; "
+                         "make fewer of them first (in Blender: the Decimate modifier), or use the command facegen rig")
     used = mesh.vertices[np.unique(mesh.faces)]
     bad = int((~np.isfinite(used).all(axis=1)).sum())
     if bad:

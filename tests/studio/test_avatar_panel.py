@@ -5,7 +5,6 @@ import pytest
 from fake_client import FakeClient
 
 from facegen.face.landmarks import REQUIRED
-from facegen.studio import picking
 from facegen.studio.avatar_panel import AvatarPanel
 from facegen.studio.avatar_scene import AVATAR
 from facegen.studio.desk import Desk
@@ -42,7 +41,7 @@ class Opened:
         """Where a ray from before the face starts that meets a landmark's true place, moved by mm."""
         figure = self.panel.scene.figure
         at = self.panel.scene.placement.apply(self.true[name]) + shift
-        return figure.place(at + [0.0, 0.0, 500.0]), (0.0, 0.0, -1.0)
+        return figure.place(at + np.array([0.0, 0.0, 500.0])), (0.0, 0.0, -1.0)
 
     def click(self, name, shift=(0.0, 0.0, 0.0)):
         self.client.scene.click(*self.ray(name, shift))
@@ -113,8 +112,8 @@ def test_what_is_dragged_goes_over_the_surface_and_takes_its_partner_along(opene
     ball = next(one for one in opened.client.scene.made if one.label == "/landmarks/eye_outer_L" and not one.removed)
     before = opened.work.landmarks
     for phase, shift in (("start", 0.0), ("update", 2.0), ("end", 4.0)):
-        at = opened.panel.scene.figure.place(
-            opened.panel.scene.placement.apply(opened.true["eye_outer_L"]) + [shift, 0.0, 0.0])
+        true = opened.panel.scene.placement.apply(opened.true["eye_outer_L"])
+        at = opened.panel.scene.figure.place(true + np.array([shift, 0.0, 0.0]))
         ball.press(phase=phase, end_position=tuple(at))
         assert (opened.work.landmarks == before) == (phase != "end")
     assert opened.off("eye_outer_L") == pytest.approx(4.0, abs=1.5)

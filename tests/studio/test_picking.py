@@ -33,7 +33,8 @@ def test_every_landmark_has_words_and_is_asked_for_once():
     assert len({WORDS[name].label for name in NAMES}) == len(NAMES)
     for name in NAMES:
         words, pair = WORDS[name], partner(name)
-        assert words.label and words.where.endswith(".")
+        assert words.label
+        assert words.where.endswith(".")
         if pair is not None:
             assert partner(pair) == name
             assert WORDS[pair].where.replace("right", "left") == words.where.replace("right", "left")
