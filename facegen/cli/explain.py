@@ -76,12 +76,13 @@ def _gather(meaning: Resolution, face: str) -> dict[str, Any]:
     units = [{"code": code, "name": unit.name, "weight": weight, "letter": letters.get(weight),
               "effect": unit.effect, "muscles": list(unit.muscles)}
              for code, weight in meaning.units.items() for unit in [table.catalogue.unit_of(code)]]
+    own = [name for name in table.coefficients(meaning.units) if name in meaning.own]
     return {
         "what": str(meaning.what), "kind": meaning.kind, "name": meaning.name,
         "about": one.about if one else None, "source": meaning.source, "units": units,
         "combinations": list(_combinations(table, meaning.units)),
         "coefficients": {name: round(value, 6) for name, value in table.coefficients(meaning.units).items()},
-        "deformation": meaning.deformation.as_dict(), "face": face, **moved,
+        "own": own, "deformation": meaning.deformation.as_dict(), "face": face, **moved,
         "warnings": list(meaning.warnings),
     }
 
@@ -119,6 +120,9 @@ def _lines(data: Mapping[str, Any], full: bool) -> Iterator[str]:
             yield f"  {' with '.join(one['units'])}: {one['why']}"
         used = ", ".join(f"{name} {value:.3g}" for name, value in data["coefficients"].items())
         yield f"  weights after that: {used}"
+    if data["own"]:
+        yield ""
+        yield f"Units that {data['person']} moves otherwise than the common table: {', '.join(data['own'])}"
     yield ""
     yield from _movements(data, full)
 

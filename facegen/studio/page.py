@@ -82,6 +82,8 @@ class Page:
             for section in sections.values():
                 section.checked()
             work = replace(self.work, **sections)
+            if work.face.person != self.work.face.person:
+                self.desk.person(work.face.person, self.name)
             if work.face.rig != self.work.face.rig:
                 self.desk.face(work.face.rig, self.name, wait=lambda why: self.say(why, "One moment"))
             if self.history.change(label, work, thing=thing):
@@ -98,6 +100,18 @@ class Page:
         with self.lock:
             self.history.redo()
             self._changed()
+
+    def refresh(self) -> None:
+        """Have all panels show the work: what they choose beside it has changed."""
+        with self.lock:
+            self._refresh()
+
+    def faces_changed(self) -> None:
+        """Show the page's face anew, and the names of the others: files of faces have changed."""
+        with self.lock:
+            self._shown = None
+            self._set_face(self.work.face)
+            self._refresh()
 
     def _changed(self) -> None:
         self.desk.store.save(self.name, self.work)
@@ -126,7 +140,12 @@ class Page:
     def show_face(self) -> None:
         """Show the work's expression on the page's face; what a clip showed there ends."""
         rig, face = self.rig, self.work.face
-        self.stage.request(FACE, lambda: rig.pose(face.meaning()))
+        try:
+            person = self.desk.person(face.person, self.name)
+        except FacegenError as error:           # a person whose table went away or is broken
+            self.say(f"{error}; the common table is used instead.", "That person is gone", colour="red")
+            person = None
+        self.stage.request(FACE, lambda: rig.pose(face.meaning(person)))
 
     # -- the person ---------------------------------------------------------------------------------------------
     def calls(self, function: Callable[..., None]) -> Callable[[Any], None]:

@@ -19,8 +19,8 @@ def test_a_work_survives_a_reload_and_the_servers_end(studio, browser_page):
     neutral = page.still()
     one, = first.pages.values()
     one.change("script", face=FaceWork(units={"27": 1.0, "L1": 1.0, "R1": 1.0}))
-    page.changed(neutral)
-    opened = page.still()
+    assert one.stage.settle()
+    opened = page.changed(neutral)
     assert difference(opened, neutral) > 0.01
     page.reload()
     page.until(lambda: len(first.pages) == 1 and one not in first.pages.values())
