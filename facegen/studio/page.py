@@ -18,6 +18,7 @@ from facegen.errors import FacegenError
 from facegen.studio.desk import Desk
 from facegen.studio.history import History
 from facegen.studio.stage import Stage
+from facegen.studio.steps import Steps
 from facegen.studio.work import FaceWork, Work
 
 log = logging.getLogger("facegen.studio")
@@ -60,6 +61,7 @@ class Page:
             self.say(told, "Your work could not be read", colour="red", closes=None)
         with self.lock:
             self._set_face(work.face)
+            self._steps = Steps(self)
             tabs = client.gui.add_tab_group()
             for title, make in panels.items():
                 with tabs.add_tab(title):
@@ -105,6 +107,7 @@ class Page:
         self._refresh()
 
     def _refresh(self) -> None:
+        self._steps.refresh(self.history)
         for panel in self._panels:
             panel.refresh(self.work)
 
@@ -126,7 +129,7 @@ class Page:
     def show_face(self) -> None:
         """Show the work's expression on the page's face; what a clip showed there ends."""
         rig, face = self.rig, self.work.face
-        self.stage.request(FACE, lambda: rig.pose(face.meaning()))
+        self.stage.request(FACE, lambda: rig.pose(face.meaning(rig)))
 
     # -- the person ---------------------------------------------------------------------------------------------
     def calls(self, function: Callable[..., None]) -> Callable[[Any], None]:
