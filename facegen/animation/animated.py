@@ -55,14 +55,15 @@ def save_animation(motion: Motion, path: str | os.PathLike[str], *, face: str | 
     """
     path = check_place(path, ANIMATED)
     times, rig = motion.key_times(fps), load_face(face)
-    cues = [motion.cue(t) for t in times.tolist()]
+    cues, shown = [motion.cue(t) for t in times.tolist()], motion.shown
     if isinstance(rig, AvatarFace):
         avatar, weight = rig, rig.neck_weight if rig.notes.framed else None
     else:
         motion.check(rig)               # what this face cannot show is said before long work
-        avatar, weight = as_avatar(rig, motion.shown.recipes(cues), _DETAIL if detail is None else detail)
+        avatar, weight = as_avatar(rig, shown.recipes(cues), _DETAIL if detail is None else detail)
+        shown = shown.on_recipes
     warnings = [*motion.check(avatar)]
-    found = list(map(motion.shown.weights_on(avatar), cues))
+    found = list(map(shown.weights_on(avatar), cues))
     weights = avatar.corrected(np.array([one for one, _ in found]))
     head = np.array([turn for _, turn in found])
     keys, neck = _keys(path.stem, times, weights, head, avatar), _neck(avatar, weight)

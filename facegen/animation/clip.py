@@ -199,7 +199,7 @@ class Clip(Timed):
     """Timed poses in tracks, ``duration`` seconds long; make one with `load_clip` or `morph`.
 
     ``warnings``: what its poses were warned of. ``sound``: what is heard meanwhile, from the first moment on; films
-    that can have sound get it. ::
+    that can have sound get it. ``own``: units that the person moves otherwise, see `Resolution.own`. ::
 
         for pose in clip.sample(25):
             pixels = renderer.draw(pose)
@@ -210,6 +210,7 @@ class Clip(Timed):
     idle: Idle | None = None
     warnings: tuple[str, ...] = ()
     sound: Sound | None = None
+    own: Mapping[str, Deformation] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         if isinstance(self.duration, bool) or not isinstance(self.duration, numbers.Real) \
@@ -226,7 +227,7 @@ class Clip(Timed):
         It goes wherever a pose goes: ``renderer.draw(clip.at(1.5))``. Before 0 and after the end the clip holds.
         """
         atoms, raw, optional = self._mixed(t)
-        table = load_units()
+        table = load_units().with_basis(self.own)
         units = table.catalogue.fold(atoms)
         total = weighted_sum([(value, table.basis[name]) for name, value in table.coefficients(units).items()])
         if not total.has_lengths:
@@ -240,7 +241,7 @@ class Clip(Timed):
             sums = [weighted_sum(terms) for terms in of.values() if terms]
             total, more = sums[0], sums[1:]
         return Resolution(self, "units" if units or not raw else "deformation", f"{t:.3f} s", None, units, total,
-                          more=tuple(more), optional=(weighted_sum(optional),) if optional else ())
+                          more=tuple(more), optional=(weighted_sum(optional),) if optional else (), own=self.own)
 
     def sample(self, fps: float = 25.0) -> Iterator[Resolution]:
         """Return the frames one after the other, each as `at` gives it."""
@@ -248,7 +249,8 @@ class Clip(Timed):
 
     def mirrored(self) -> Clip:
         """Return the clip with left and right changed; the idle layer is left as it is."""
-        return replace(self, tracks=tuple(track.mirrored() for track in self.tracks))
+        return replace(self, tracks=tuple(track.mirrored() for track in self.tracks),
+                       own={_mirrored(atom): one.mirrored() for atom, one in self.own.items()})
 
     @property
     def raw(self) -> tuple[Deformation, ...]:
@@ -288,9 +290,15 @@ class Clip(Timed):
 
         return at
 
+    @property
+    def on_recipes(self) -> Clip:
+        """What is left to be shown by the shapes of `recipes`, in which units are this person's already."""
+        return replace(self, own={})
+
     def recipes(self, cues: Sequence[float]) -> dict[str, Recipe]:
         """Return the units that move at some times, or all where raw data must be made of them."""
-        units = shape_set("units")
+        units = {name: replace(one, deformation=(self.own[member],)) if (member := next(iter(one.members))) in self.own
+                 else one for name, one in shape_set("units").items()}
         if self.raw:
             return units
         moving = {member for t in cues for member in load_units().coefficients(self.units_at(t))}
@@ -334,7 +342,7 @@ class Clip(Timed):
         if self.idle is not None:
             _add(atoms, [(1.0, Pose(self.idle.at(t)))])
         for one, other in _opposites():
-            if one in atoms and other in atoms:
+            if one in atoms and other in atoms and not self.own.keys() & {one, other}:
                 both = min(atoms[one], atoms[other])
                 atoms[one], atoms[other] = atoms[one] - both, atoms[other] - both
         return {atom: weight for atom, weight in atoms.items() if weight}, raw, optional
@@ -374,6 +382,14 @@ def _check_time(name: str, value: object) -> None:
 def _check_ease(name: str, value: object) -> None:
     if value not in EASES:
         raise InputError(f"{name}: unknown ease {value!r}{nearest(str(value), EASES)} (known: {', '.join(EASES)})")
+
+
+def own_units(meanings: Iterable[Resolution]) -> Mapping[str, Deformation]:
+    """Return the units that a person moves otherwise, of what was resolved; InputError if two people do."""
+    found = [one.own for one in meanings if one.units]
+    if any(one != found[0] for one in found):
+        raise InputError("poses: resolved for people whose units move differently; a clip shows one person")
+    return found[0] if found else {}
 
 
 def pose_of(resolution: Resolution) -> Pose:

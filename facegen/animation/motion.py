@@ -29,6 +29,10 @@ class Shown(Protocol):
     def weights_on(self, avatar: AvatarFace) -> Callable[[Any], tuple[NDArray[np.float64], NDArray[np.float64]]]:
         """Return what makes, of a cue, the weights (s,) of the avatar's shapes and how the head turns (4,)."""
 
+    @property
+    def on_recipes(self) -> Shown:
+        """What is left to be shown by a face that has the shapes of `recipes`."""
+
     def recipes(self, cues: Sequence[Any]) -> Mapping[str, Recipe]:
         """Return the shapes that the parametric face needs to show some cues as blendshapes."""
 

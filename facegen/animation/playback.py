@@ -71,6 +71,11 @@ class Cast:
         driver = Driver(avatar, self.vocabulary, self.names)
         return lambda cue: driver.shape_weights(*cue)
 
+    @property
+    def on_recipes(self) -> Cast:
+        """All of it."""
+        return self
+
     def recipes(self, cues: Sequence[Cue]) -> dict[str, Recipe]:
         """Return the shapes by their owner's names; of units those that move. ARKit's glances show the gaze."""
         meaning = Meaning(self.vocabulary, self.names)

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from facegen.animation.angles import AXES, turned
-from facegen.animation.clip import LONGEST, Clip, Event, Keyframe, Pose, Track, joined, pose_of
+from facegen.animation.clip import LONGEST, Clip, Event, Keyframe, Pose, Track, joined, own_units, pose_of
 from facegen.animation.coarticulation import SpeechTrack
 from facegen.animation.easing import DEFAULT_EASE, EASES
 from facegen.animation.idle import Idle
@@ -69,7 +69,7 @@ def morph(*poses: object, seconds: float = 1.0, hold: float = 0.5, back: bool = 
             keys.append(Keyframe(t, stop, ease))
         t += seconds
     warnings = tuple(dict.fromkeys(warning for one in meanings for warning in one.warnings))
-    return Clip((Track("morph", tuple(keys)),), keys[-1].t, _idle(idle), warnings)
+    return Clip((Track("morph", tuple(keys)),), keys[-1].t, _idle(idle), warnings, own=own_units(meanings))
 
 
 def _idle(idle: int | Idle | None) -> Idle | None:
@@ -111,7 +111,7 @@ class _Reader:
         if not tracks and layer is None:
             raise self.root.fail("nothing happens: give keyframes, events, speech, tracks or idle")
         return Clip(tuple(tracks), self._duration(tracks), layer, tuple(dict.fromkeys(self.warnings)),
-                    mixed(self.sounds))
+                    mixed(self.sounds), load_units().own_basis(self.person))
 
     def _duration(self, tracks: list[Layer]) -> float:
         """Return the clip's length, by default until all is over."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-from facegen.animation.clip import LONGEST, Clip, Event, Track, pose_of
+from facegen.animation.clip import LONGEST, Clip, Event, Track, own_units, pose_of
 from facegen.animation.coarticulation import SpeechTrack
 from facegen.animation.espeak import speak
 from facegen.animation.idle import Idle
@@ -69,7 +69,8 @@ def speech_clip(said: Said, *, effort: float = 1.0, expression: Resolution | Non
             0.0, pose_of(expression), onset, length - onset - offset, offset, kind.onset_ease, kind.offset_ease),)))
     tracks.append(SpeechTrack("speech", said.speech.later(said.at), effort))
     sound = said.sound.after(said.at) if said.sound is not None and said.at else said.sound
-    return Clip(tuple(tracks), length, None if idle is None else Idle(idle), said.speech.warnings, sound)
+    return Clip(tuple(tracks), length, None if idle is None else Idle(idle), said.speech.warnings, sound,
+                own_units([expression] if expression is not None else []))
 
 
 def read_speech_entry(entry: Entry, folder: Path) -> Said:

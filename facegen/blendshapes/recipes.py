@@ -72,7 +72,8 @@ def shape_set(name: str, person: str | Path | Person | None = None) -> dict[str,
 
     name: "units" (each side and lip apart, and correctives: their sum with the unit table's coefficients is any
         expression), "expressions" (at full intensity), "arkit" (Apple's 52), "visemes" (15), "vrm" (the presets of VRM
-        1.0) or "all". person: whose habits override expressions, as everywhere.
+        1.0) or "all". person: whose habits override expressions, as everywhere. Units stay the common ones, so that
+        they mean the same on every rig; an expression with units that the person moves otherwise is no sum of them.
 
     The head's own movements (units 51 to 58) are no shapes: a neck turns, it does not blend. Raises InputError. ::
 
@@ -124,7 +125,13 @@ def _units() -> Mapping[str, Recipe]:
 
 
 def _expressions(person: str | Path | Person | None) -> dict[str, Recipe]:
-    return dict(_common()) if person is None else {**_common(), **_made(load_person(person).expressions)}
+    if person is None:
+        return dict(_common())
+    someone = load_person(person)
+    own = load_units().own_basis(someone)
+    if not own:
+        return {**_common(), **_made(someone.expressions)}
+    return _made({**load_expressions().expressions, **someone.expressions}, own)
 
 
 @cache
@@ -132,16 +139,21 @@ def _common() -> Mapping[str, Recipe]:
     return _made(load_expressions().expressions)
 
 
-def _made(expressions: Mapping[str, Expression]) -> dict[str, Recipe]:
+def _made(expressions: Mapping[str, Expression], own: Mapping[str, Deformation] = MappingProxyType({})
+          ) -> dict[str, Recipe]:
     table, made = load_units(), {}
     for name, one in expressions.items():
         members = {member: value for member, value in table.coefficients(one.units).items() if not is_head(member)}
-        made[name] = Recipe((_sum(members),), None, members, canonical(one.units), "expressions", one.about, one.source)
+        total = _sum(members, own)
+        if own.keys() & members.keys():
+            members = {}
+        made[name] = Recipe((total,), None, members, canonical(one.units), "expressions", one.about,
+                            one.source)
     return made
 
 
-def _sum(members: Mapping[str, float]) -> Deformation:
-    table = load_units()
+def _sum(members: Mapping[str, float], own: Mapping[str, Deformation] = MappingProxyType({})) -> Deformation:
+    table = load_units().with_basis(own)
     total = weighted_sum([(value, table.basis[member]) for member, value in members.items()])
     return total if total.has_lengths else replace(total, units=table.units)
 

@@ -22,7 +22,7 @@ def explain(what: What, face: FaceName = "akimoto", person: PersonName = None, i
     from facegen.face.chain import chain, chain_lines
     from facegen.face.face import load_face
 
-    data = chain(meaning, load_face(face)) | {"face": face, "person": person, "intensity": intensity}
+    data = chain(meaning, load_face(face), person) | {"face": face, "intensity": intensity}
     if json:
         print_json(data)
         return

@@ -105,7 +105,8 @@ def people(json: Json = False) -> None:
     from facegen.facs.expression_table import people as names
 
     found = {name: load_person(name) for name in names()}
-    rows = [{"name": name, "about": one.about, "expressions": list(one.expressions), "source": one.source}
+    rows = [{"name": name, "about": one.about, "expressions": list(one.expressions),
+             "units": list(one.units), "source": one.source}
             for name, one in found.items()]
     _show(rows, [(row["name"], row["about"]) for row in rows], json)
 

@@ -25,7 +25,7 @@ from facegen.blendshapes.recipes import CLASH, Recipe, is_head, shape_set
 from facegen.errors import InputError, nearest
 from facegen.face.avatar_landmarks import placing
 from facegen.face.avatar_notes import Notes, read_notes
-from facegen.face.convert import Shapes, raw_movement
+from facegen.face.convert import Shapes, as_common, raw_movement
 from facegen.face.face import load_face
 from facegen.face.head import neck_weight, turn_head
 from facegen.facs.deformation import Deformation, weighted_sum
@@ -241,9 +241,10 @@ class AvatarFace:
 
     # -- inside -------------------------------------------------------------------------------------------------
     def _weights(self, found: Resolution) -> tuple[dict[str, float], float]:
-        table = load_units()
+        table = load_units().with_basis(found.own)
         members = {name: value for name, value in table.coefficients(found.units).items() if not is_head(name)}
-        raw = tuple(one for one in (_beyond(found, table), *found.more) if one)
+        members, own = as_common(members, found.own)
+        raw = tuple(one for one in (_beyond(found, table), *own, *found.more) if one)
         if not members and not raw:
             return {}, 0.0
         return self.made_of(held(members), raw)

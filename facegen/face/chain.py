@@ -30,12 +30,12 @@ _WORDS = {
 }
 
 
-def chain(meaning: Resolution, rig: Any) -> dict[str, Any]:
+def chain(meaning: Resolution, rig: Any, person: str | None = None) -> dict[str, Any]:
     """Return all steps that lead from what was resolved to the movements of a face, as plain data.
 
-    rig: a face or an avatar. What a name, a script and raw data mean stands under ``name``, ``units`` (with FACS
-    letters), ``combinations`` (what does not simply add), ``coefficients``, ``deformation``, and ``millimetres`` of the
-    feature points or ``shapes`` of the avatar.
+    rig: a face or an avatar. person: whose habits are in it, for the words. What a name, a script and raw data mean
+    stands under ``name``, ``units`` (with FACS letters), ``combinations`` (what does not simply add), ``coefficients``,
+    ``deformation``, and ``millimetres`` of the feature points or ``shapes`` of the avatar.
     """
     table, one = load_units(), meaning.expression
     moved: dict[str, Any] = {"millimetres": {}}
@@ -49,12 +49,13 @@ def chain(meaning: Resolution, rig: Any) -> dict[str, Any]:
     units = [{"code": code, "name": unit.name, "weight": weight, "letter": letters.get(weight),
               "effect": unit.effect, "muscles": list(unit.muscles)}
              for code, weight in meaning.units.items() for unit in [table.catalogue.unit_of(code)]]
+    own = [name for name in table.coefficients(meaning.units) if name in meaning.own]
     return {
         "what": str(meaning.what), "kind": meaning.kind, "name": meaning.name,
         "about": one.about if one else None, "source": meaning.source, "units": units,
         "combinations": list(combinations(table, meaning.units)),
         "coefficients": {name: round(value, 6) for name, value in table.coefficients(meaning.units).items()},
-        "deformation": whole(meaning).as_dict(), "face": rig.name, **moved,
+        "own": own, "person": person, "deformation": whole(meaning).as_dict(), "face": rig.name, **moved,
         "warnings": list(meaning.warnings),
     }
 
@@ -101,6 +102,9 @@ def chain_lines(data: Mapping[str, Any], *, full: bool = False, hint: str = "") 
             yield f"  {' with '.join(one['units'])}: {one['why']}"
         used = ", ".join(f"{name} {value:.3g}" for name, value in data["coefficients"].items())
         yield f"  weights after that: {used}"
+    if data["own"]:
+        yield ""
+        yield f"Units that {data['person']} moves otherwise than the common table: {', '.join(data['own'])}"
     yield ""
     yield from movement_lines(data, full=full, hint=hint)
 

@@ -11,7 +11,7 @@ import math
 import numbers
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cache, cached_property
+from functools import cache, cached_property, lru_cache
 from pathlib import Path
 
 import numpy as np
@@ -253,6 +253,34 @@ def raw_movement(several: tuple[Deformation, ...]) -> NDArray[np.float64]:
 def of_set(name: str) -> Shapes:
     """Return a set of shapes by its name."""
     return Shapes(shape_set(name))
+
+
+def as_common(members: Members, own: Mapping[str, Deformation]) -> tuple[dict[str, float], list[Deformation]]:
+    """Return members of the common unit table, and further movements, that are members of a person's.
+
+    own: member -> what it does on that person. So much of it as is the common movement stays the common member: shapes
+    for that are there, and a weaker one is less of them, which no movement on top could make.
+    """
+    result, rest = dict(members), []
+    for name in own.keys() & members.keys():
+        common = load_units().basis[name]
+        share = _share(own[name], common)
+        result[name] = share * members[name]
+        rest.append((own[name] - common * share) * members[name])
+    return {name: value for name, value in result.items() if value}, [one for one in rest if one]
+
+
+@lru_cache(maxsize=512)
+def _share(own: Deformation, common: Deformation) -> float:
+    """Return how much of a movement another holds, 0 or more: the foot of the one on the other."""
+    a, b = raw_movement((own,)), raw_movement((common,))
+    size = float(b @ b)
+    if size < _STILL ** 2:
+        return 0.0
+    foot = max(0.0, float(a @ b) / size)
+    # A plain multiple is found to the last bit, so that nothing is left over.
+    near = round(foot, 3)
+    return near if own == common * near else foot
 
 
 def _as_units(members: Members, raw: NDArray[np.float64]) -> tuple[dict[str, float], float]:

@@ -2,7 +2,7 @@
 person.
 
 A person's habits override the common table: their ``happiness`` stands for everybody's, and so does every
-synonym.
+synonym. Their action units, too, may move otherwise (`facegen.facs.own_units`).
 """
 
 from __future__ import annotations
@@ -17,9 +17,12 @@ from pathlib import Path
 from facegen.data import tables_dir
 from facegen.errors import InputError, NotationError, nearest
 from facegen.facs.notation import looks_like_units, parse
+from facegen.facs.own_units import OwnUnit, read_own_units
 from facegen.facs.units import Catalogue, load_catalogue
 from facegen.facs.validate import Entry
 from facegen.facs.yamlfile import SUFFIXES, read_data
+
+_HABITS = ("overrides", "adds", "aliases", "units")
 
 
 @dataclass(frozen=True)
@@ -59,13 +62,17 @@ class ExpressionTable:
 
 @dataclass(frozen=True)
 class Person:
-    """One person's habits: ``expressions`` that override common ones or are new, own ``aliases``."""
+    """One person's habits: ``expressions`` that override common ones or are new, own ``aliases``.
+
+    ``units``: atom -> how this person moves it, where not as everybody.
+    """
 
     name: str
     about: str
     source: str
     expressions: Mapping[str, Expression]
     aliases: Mapping[str, str] = field(default_factory=dict)
+    units: Mapping[str, OwnUnit] = field(default_factory=dict)
 
     @property
     def words(self) -> tuple[str, ...]:
@@ -171,29 +178,39 @@ def _aliases(table: Mapping[str, Expression], entries: Mapping[str, Entry]) -> d
 
 
 def _read_person(path: Path, common: ExpressionTable) -> Person:
-    root = Entry(read_data(path), str(path))
-    fields = root.fields(required=("about", "source"), optional=("name", "overrides", "adds", "aliases"))
-    source, catalogue = fields["source"].text(), load_catalogue()
+    return person_from_data(read_data(path), str(path), name=path.stem, expressions=common)
+
+
+def person_from_data(data: object, source: str = "person", *, name: str = "person",
+                     expressions: ExpressionTable | None = None) -> Person:
+    """Return the person that plain data of a file's form describe (docs/tables.md).
+
+    source: names the data in errors. name: if the data give none. Raises TableError.
+    """
+    common, root = expressions or load_expressions(), Entry(data, source)
+    fields = root.fields(required=("about", "source"), optional=("name", *_HABITS))
+    said, catalogue = fields["source"].text(), load_catalogue()
     table: dict[str, Expression] = {}
     entries: dict[str, Entry] = {}
     for key in ("overrides", "adds"):
-        for name, entry in fields[key].items() if key in fields else ():
-            known = name in common.expressions
+        for word, entry in fields[key].items() if key in fields else ():
+            known = word in common.expressions
             if key == "overrides" and not known:
-                hint = f"; '{name}' is a synonym of '{common.aliases[name]}': override that" \
-                    if name in common.aliases else nearest(name, common.expressions) or ""
-                raise entry.fail(f"unknown expression '{name}'{hint} (a new one belongs under 'adds')")
+                hint = f"; '{word}' is a synonym of '{common.aliases[word]}': override that" \
+                    if word in common.aliases else nearest(word, common.expressions) or ""
+                raise entry.fail(f"unknown expression '{word}'{hint} (a new one belongs under 'adds')")
             if key == "adds" and known:
-                raise entry.fail(f"'{name}' is an expression of the common table: put it under 'overrides'")
-            table[name] = _expression(name, entry, catalogue, None, source)
-            entries[name] = entry
-    if not table and "aliases" not in fields:
-        raise root.fail("a person has at least one of: overrides, adds, aliases")
+                raise entry.fail(f"'{word}' is an expression of the common table: put it under 'overrides'")
+            table[word] = _expression(word, entry, catalogue, None, said)
+            entries[word] = entry
+    if not any(key in fields for key in ("aliases", "units")) and not table:
+        raise root.fail(f"a person has at least one of: {', '.join(_HABITS)}")
     aliases = _aliases(table, entries)
     for word, entry in fields["aliases"].items() if "aliases" in fields else ():
         _name(entry, word)
         if word in table or word in aliases:
             raise entry.fail(f"'{word}' already means an expression of this person")
         aliases[word] = entry.choice((*table, *common.expressions), "expression")
-    name = fields["name"].text() if "name" in fields else path.stem
-    return Person(name, fields["about"].text(), source, table, aliases)
+    units = read_own_units(catalogue, fields["units"]) if "units" in fields else {}
+    name = fields["name"].text() if "name" in fields else name
+    return Person(name, fields["about"].text(), said, table, aliases, units)

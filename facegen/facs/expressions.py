@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numbers
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from facegen.data import tables_dir
@@ -37,7 +37,8 @@ class Resolution:
     table's entry, if a name led here. units: code -> weight, intensity applied, combinations not yet; empty
     for raw data. source: where the recipe or data come from, as far as known. more: further movements, in other units
     of length than ``deformation``, which only a face can add to it. optional: movements that a face without the points
-    for them leaves out, as the tongue's in speech.
+    for them leaves out, as the tongue's in speech. own: members of the unit table's basis -> what they do, where a
+    person moves them otherwise; ``deformation`` has it so.
     """
 
     what: object
@@ -50,6 +51,7 @@ class Resolution:
     source: str | None = None
     more: tuple[Deformation, ...] = ()
     optional: tuple[Deformation, ...] = ()
+    own: Mapping[str, Deformation] = field(default_factory=dict)
 
 
 def presets() -> tuple[str, ...]:
@@ -74,6 +76,8 @@ def resolve(what: What, *, person: str | Path | Person | None = None, intensity:
     path. person: a shipped person's name or the path of a file. intensity: 0..1. units, expressions: tables
     other than the shipped ones.
 
+    A person's own units move their way in scripts and mappings too.
+
     Raises InputError; its children NotationError (a script), TableError and FileError (a file) say more.
     """
     if isinstance(intensity, bool) or not isinstance(intensity, numbers.Real) or not 0.0 <= intensity <= 1.0:
@@ -81,6 +85,7 @@ def resolve(what: What, *, person: str | Path | Person | None = None, intensity:
     units = units or load_units()
     expressions = expressions or load_expressions()
     someone = None if person is None else load_person(person, expressions=expressions)
+    own = units.own_basis(someone)
 
     if isinstance(what, Deformation):
         return Resolution(what, "deformation", "deformation", None, {}, what * intensity)
@@ -88,7 +93,7 @@ def resolve(what: What, *, person: str | Path | Person | None = None, intensity:
         if any(key in KEYS for key in what):
             raw = deformation_from_dict(what)
             return Resolution(what, "deformation", "deformation", None, {}, raw * intensity)
-        return _units(what, parse_weights(what, catalogue=units.catalogue), intensity, units)
+        return _units(what, parse_weights(what, catalogue=units.catalogue), intensity, units, own)
     if isinstance(what, Path):
         return _file(what, what, intensity)
     if not isinstance(what, str):
@@ -99,26 +104,31 @@ def resolve(what: What, *, person: str | Path | Person | None = None, intensity:
 
     expression = expressions.find(what, someone)
     if expression is not None:
-        return _units(what, expression.units, intensity, units, expression)
+        return _units(what, expression.units, intensity, units, own, expression)
     if is_path(what):
         return _file(what, Path(what).expanduser(), intensity)
     if looks_like_units(what):
-        return _units(what, parse(what, catalogue=units.catalogue), intensity, units)
+        return _units(what, parse(what, catalogue=units.catalogue), intensity, units, own)
     preset = {fold_name(name): name for name in presets()}.get(fold_name(what))
     if preset is not None:
         return _file(what, tables_dir() / "presets" / f"{preset}.yaml", intensity)
     raise _unknown(what, someone, expressions)
 
 
+def resolve_units(weights: Mapping[str, float], own: Mapping[str, Deformation]) -> Resolution:
+    """Return what unit weights mean where some members of the basis move otherwise, as `Resolution.own` has them."""
+    return _units(weights, parse_weights(weights), 1.0, load_units(), own)
+
+
 def _units(what: object, weights: Mapping[str, float], intensity: float, table: UnitTable,
-           expression: Expression | None = None) -> Resolution:
+           own: Mapping[str, Deformation], expression: Expression | None = None) -> Resolution:
     """Return the resolution of unit weights."""
     scaled = {code: weight * intensity for code, weight in weights.items() if weight * intensity > 0.0}
-    deformation, warnings = table.deformation(scaled)
+    deformation, warnings = table.with_basis(own).deformation(scaled)
     name = expression.name if expression else canonical(scaled, catalogue=table.catalogue)
     source = expression.source if expression else None
     return Resolution(what, "expression" if expression else "units", name, expression, scaled, deformation,
-                      tuple(warnings), source)
+                      tuple(warnings), source, own=own)
 
 
 def _file(what: object, path: Path, intensity: float) -> Resolution:

@@ -9,12 +9,13 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
-from functools import cache
+from functools import cache, cached_property
 from pathlib import Path
 
 from facegen.data import tables_dir
+from facegen.errors import InputError
 from facegen.facs import rules as combining
-from facegen.facs.deformation import KEYS, UNITS, Deformation, deformation_from_entry, weighted_sum
+from facegen.facs.deformation import UNITS, Deformation, deformation_from_entry, weighted_sum
 from facegen.facs.expression_table import (
     Expression,
     ExpressionTable,
@@ -23,11 +24,10 @@ from facegen.facs.expression_table import (
     load_person,
     people,
 )
+from facegen.facs.own_units import UNIT_KEYS, check_own, known_points
 from facegen.facs.units import Catalogue, read_catalogue, split_code
 from facegen.facs.validate import Entry
 from facegen.facs.yamlfile import read_data
-
-_UNIT_KEYS = tuple(key for key in KEYS if key != "units")
 
 
 @dataclass(frozen=True)
@@ -62,6 +62,27 @@ class UnitTable:
         if not total.has_lengths:
             total = replace(total, units=self.units)
         return total, self.warnings(weights)
+
+    def own_basis(self, person: Person | None) -> dict[str, Deformation]:
+        """Return the members of the basis that a person moves in their own way, and how.
+
+        Raises TableError for a feature point or fold that no face has.
+        """
+        if person is None or not person.units:
+            return {}
+        check_own(person.units, *self._names)
+        if self.units != "face":
+            raise InputError(f"person: data of units are fractions of the face, but this table is in {self.units}")
+        return {atom: one.of(self.basis[atom]) for atom, one in person.units.items()}
+
+    def with_basis(self, own: Mapping[str, Deformation]) -> UnitTable:
+        """Return the table with some members of the basis in place of its own."""
+        return replace(self, basis={**self.basis, **own}) if own else self
+
+    @cached_property
+    def _names(self) -> tuple[frozenset[str], frozenset[str]]:
+        """Feature points and folds that data may name."""
+        return known_points(self.basis), frozenset(name for one in self.basis.values() for name in one.folds)
 
     def warnings(self, weights: Mapping[str, float]) -> list[str]:
         """Return one sentence for each pair of active units that work against each other."""
@@ -164,7 +185,7 @@ def _basis(catalogue: Catalogue, entry: Entry,
                 raise fields[kind].fail("refers to a unit with other sides")
             return {mark: (d.mirrored() if kind == "mirror_of" else d) * scale
                     for mark, d in zip(marks, target.values(), strict=True)}
-        one.fields(optional=_UNIT_KEYS)
+        one.fields(optional=UNIT_KEYS)
         own = deformation_from_entry(Entry({**one.value, "units": units}, one.source, one.path))
         if marks == ("L", "R"):
             return {"L": own, "R": own.mirrored()}

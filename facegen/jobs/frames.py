@@ -313,7 +313,7 @@ def _plain(value: Any) -> Any:
     if isinstance(value, Deformation):
         return value.as_dict()
     if isinstance(value, Resolution):
-        return [_plain(value.units), _plain(value.deformation), _plain(value.more)]
+        return [_plain(value.units), _plain(value.deformation), _plain(value.more), _plain(value.own)]
     if is_dataclass(value):
         return {one.name: _plain(getattr(value, one.name)) for one in fields(value)}
     if isinstance(value, Mapping):

@@ -15,6 +15,7 @@ from facegen.errors import FileError, InputError
 from facegen.face.face import load_face
 from facegen.face.rig import Rig
 from facegen.facs.deformation import deformation_from_dict
+from facegen.facs.expressions import resolve_units
 from facegen.facs.notation import canonical
 from facegen.fileio.images import save_image, save_mask
 from facegen.fileio.textfile import save_text
@@ -95,7 +96,9 @@ class PictureTask:
             raise FileError(f"{self.output}: cannot be replaced: {error.strerror or error}") from error
         p, face = self.picture, load_face(self.picture.face)
         renderer = shared((self.group, self.settings), lambda: self._renderer(face, None))
-        pose = dict(p.units) if p.deformation is None else deformation_from_dict(thawed(p.deformation))
+        pose: Any = dict(p.units) if p.deformation is None else deformation_from_dict(thawed(p.deformation))
+        if p.own and p.deformation is None:
+            pose = resolve_units(pose, {name: deformation_from_dict(one) for name, one in thawed(p.own).items()})
         vertices = face.pose(pose, detail=renderer.detail)
         camera = frame(portrait(face, renderer.mesh.vertices), portrait(face, vertices), size=p.size, view=p.view,
                        orthographic=self.settings.orthographic)

@@ -19,6 +19,7 @@ from facegen.face.face import load_face
 from facegen.face.named import face_names, is_face_name
 from facegen.facs.expression_table import is_path
 from facegen.facs.expressions import Resolution, full_name, resolve
+from facegen.facs.tables import load_units
 from facegen.facs.units import load_catalogue
 from facegen.facs.validate import Entry
 from facegen.facs.yamlfile import read_data
@@ -48,7 +49,8 @@ _MOST_LOOKED_AT = 300       # poses of units that a face is asked about: a milli
 class Picture:
     """One picture: what is asked for, and what it means. ``units`` and ``deformation``: one of them is empty.
 
-    ``number``: its place among drawn pictures, 0 for others. ``called``: its own name, if it was given one.
+    ``own``: members of the unit table's basis that the person moves otherwise, of those in use. ``number``: its place
+    among drawn pictures, 0 for others. ``called``: its own name, if it was given one.
     """
 
     pose: str
@@ -63,6 +65,7 @@ class Picture:
     view: tuple[float, float]
     light: str
     background: str | tuple[float, ...]
+    own: Any = ()
     number: int = 0
     called: str | None = None
 
@@ -271,7 +274,8 @@ class _Reader:
         return Picture(pose=pose if isinstance(pose, str) else _spoken(pose), kind=meaning.kind, caption=meaning.name,
                        units=tuple(meaning.units.items()), deformation=raw, face=value["face"],
                        person=value["person"], intensity=value["intensity"], size=check_size(value["size"]),
-                       view=value["view"], light=value["light"], background=value["background"])
+                       view=value["view"], light=value["light"], background=value["background"],
+                       own=_own(meaning))
 
     def _meaning(self, said: Any, pose: Any, person: str | None, intensity: float,
                  wish: Mapping[str, tuple[Any, Entry]]) -> Resolution:
@@ -293,6 +297,14 @@ class _Reader:
             raise entry.fail(str(error)) from error
         except (TypeError, ValueError) as error:
             raise (entry.fail(str(error)) if entry else TableError(str(error))) from error
+
+
+def _own(meaning: Resolution) -> Any:
+    """Return what a person moves otherwise in this pose."""
+    if not meaning.own:
+        return ()
+    used = load_units().coefficients(meaning.units)
+    return _frozen({name: one.as_dict() for name, one in meaning.own.items() if name in used})
 
 
 def _range(entry: Entry, low: float, high: float, *, whole: bool = False) -> tuple[float, float]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import threading
 from collections.abc import Callable
 from pathlib import Path
@@ -11,13 +12,21 @@ from typing import Any
 from facegen.errors import InputError, nearest
 from facegen.face.face import load_face
 from facegen.face.named import face_names
+from facegen.facs.expression_table import Person, load_person, people
 from facegen.fileio.textfile import make_folder
 from facegen.studio.store import Store
 
 FACES = "faces"
 """Folder of a work that holds its own rigged avatars."""
 
+PEOPLE = "people"
+"""Folder of a work that holds its own people's tables."""
+
+RIGGED = (".glb", ".vrm")
+"""What their names end in."""
+
 _AVATARS = "avatars"
+_FILE = re.compile(r"[\w][\w -]{0,59}\.yaml")
 
 
 class Desk:
@@ -37,7 +46,8 @@ class Desk:
         from facegen.transfer.rig import avatar_names
 
         own = self.store.folder / work / FACES
-        return (*face_names(), *avatar_names(), *sorted(path.name for path in own.glob("*.glb")))
+        rigged = sorted(path.name for path in own.glob("*") if path.suffix in RIGGED)
+        return (*face_names(), *avatar_names(), *rigged)
 
     def face(self, name: str, work: str, *, wait: Callable[[str], None] = lambda why: None) -> Any:
         """Return a face by name, loaded once. A shipped avatar is rigged when it is first asked for.
@@ -47,7 +57,7 @@ class Desk:
         if name not in self.face_names(work):
             raise InputError(f"face: unknown face '{name}'{nearest(name, self.face_names(work))}")
         own = self.store.folder / work / FACES / name
-        key = own if own.suffix == ".glb" else name
+        key = own if own.suffix in RIGGED else name
         with self._lock:
             lock = self._locks.setdefault(key, threading.Lock())
         with lock:                              # who asks second waits and finds it
@@ -56,6 +66,27 @@ class Desk:
             if found is None or found[0] != changed:
                 self._faces[key] = found = changed, self._load(key, wait)
         return found[1]
+
+    def people(self, work: str) -> tuple[str, ...]:
+        """Return the people that a page can choose: shipped ones by name, its own by their file's name."""
+        return (*people(), *sorted(path.name for path in (self.store.folder / work / PEOPLE).glob("*.yaml")))
+
+    def person(self, name: str | None, work: str) -> Person | None:
+        """Return a person by a name of `people`, as their file is now; nobody for None.
+
+        InputError for an unknown name, TableError for a file that will not do.
+        """
+        if name is None:
+            return None
+        if name not in self.people(work):
+            raise InputError(f"person: unknown person '{name}'{nearest(name, self.people(work))}")
+        return load_person(self.person_file(name, work) if name.endswith(".yaml") else name)
+
+    def person_file(self, name: str, work: str) -> Path:
+        """Return where the table of a person of the work's own, "ada.yaml", is kept; InputError if that is no name."""
+        if not _FILE.fullmatch(name):
+            raise InputError(f"person: expected a name of letters, digits, _ and -, got {name.removesuffix('.yaml')!r}")
+        return self.store.folder_of(work) / PEOPLE / name
 
     def _load(self, key: Path | str, wait: Callable[[str], None]) -> Any:
         if isinstance(key, Path) or key in face_names():

@@ -7,7 +7,6 @@ from dataclasses import replace
 
 from facegen.facs.blend import blend
 from facegen.facs.chance import random_expression
-from facegen.facs.expression_table import people
 from facegen.studio.gaze_target import GazeTarget
 from facegen.studio.page import Page
 from facegen.studio.palette import Palette
@@ -54,7 +53,7 @@ class FacePanel:
 
     def _people(self) -> tuple[str, ...]:
         person = self.page.work.face.person
-        return tuple(dict.fromkeys([_NOBODY, *people(), *([person] if person else [])]))
+        return tuple(dict.fromkeys([_NOBODY, *self.page.desk.people(self.page.name), *([person] if person else [])]))
 
     # -- what the person does -----------------------------------------------------------------------------------
     def _chance(self, seed: int | None = None) -> None:
@@ -77,7 +76,8 @@ class FacePanel:
     def _other_person(self) -> None:
         face = self.page.work.face
         person = None if self._person.value == _NOBODY else self._person.value
-        units = blend(face.blend, person=person) if face.blend else face.units
+        someone = self.page.desk.person(person, self.page.name)
+        units = blend(face.blend, person=someone) if face.blend else face.units
         self.page.change(f"person {self._person.value}", face=replace(face, person=person, units=units))
 
     # -- what is shown ------------------------------------------------------------------------------------------

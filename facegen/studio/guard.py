@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from urllib.parse import parse_qs, urlsplit
 
 WORK_ID = re.compile(r"[A-Za-z0-9_-]{16,64}")
-WORK_PATH = re.compile(rf"/w/({WORK_ID.pattern})")
+_WORK_PATH = re.compile(rf"/w/({WORK_ID.pattern})")
 LOOPBACK_NAMES = ("localhost", "127.0.0.1", "[::1]")
 
 All = Callable[[str], Sequence[str]]        # a header's name -> every value that came with it
@@ -59,6 +59,8 @@ def check_host(found: Sequence[str], names: Sequence[str], port: int, *, address
 
 
 def _is_address(name: str) -> bool:
+    if "%" in name:         # after it anything may stand, and a Host is repeated in a header of ours
+        return False
     try:
         ipaddress.ip_address(name[1:-1] if name.startswith("[") and name.endswith("]") else name)
     except ValueError:
@@ -93,20 +95,23 @@ def cookie_name(port: int) -> str:
     return f"facegen-studio-{port}"
 
 
-def token_given(every: All, query: str, port: int) -> str | None:
-    """Return the token that came with a request: in the URL, the cookie, or as ``Authorization: Bearer``."""
-    for value in parse_qs(query).get("token", []):
-        return value
+def token_in_query(query: str) -> str | None:
+    """Return the token in a URL, ``?token=...``."""
+    return next(iter(parse_qs(query).get("token", [])), None)
+
+
+def tokens_in_headers(every: All, port: int) -> list[str]:
+    """Return the tokens in a request's headers: the cookie, and ``Authorization: Bearer``."""
+    found = []
     for value in every("Authorization"):
         kind, _, rest = value.strip().partition(" ")
         if kind.casefold() == "bearer":
-            return rest.strip()
-    for line in every("Cookie"):
-        for pair in line.split(";"):
-            name, _, value = pair.strip().partition("=")
-            if name == cookie_name(port):
-                return value
-    return None
+            found.append(rest.strip())
+    for pair in ";".join(every("Cookie")).split(";"):
+        name, _, value = pair.strip().partition("=")
+        if name == cookie_name(port):
+            found.append(value)
+    return found
 
 
 def is_token(given: str | None, token: str) -> bool:
@@ -116,5 +121,5 @@ def is_token(given: str | None, token: str) -> bool:
 
 def work_of(path: str) -> str | None:
     """Return the id in ``/w/<id>``, None for any other path. Nothing is decoded: an id needs no escapes."""
-    found = WORK_PATH.fullmatch(path)
+    found = _WORK_PATH.fullmatch(path)
     return found[1] if found else None

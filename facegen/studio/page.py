@@ -15,6 +15,8 @@ from dataclasses import replace
 from typing import Any, Protocol
 
 from facegen.errors import FacegenError
+from facegen.facs.expression_table import Person
+from facegen.facs.expressions import Resolution
 from facegen.studio.desk import Desk
 from facegen.studio.history import History
 from facegen.studio.stage import Stage
@@ -84,6 +86,8 @@ class Page:
             for section in sections.values():
                 section.checked()
             work = replace(self.work, **sections)
+            if work.face.person != self.work.face.person:
+                self.desk.person(work.face.person, self.name)
             if work.face.rig != self.work.face.rig:
                 self.desk.face(work.face.rig, self.name, wait=lambda why: self.say(why, "One moment"))
             if self.history.change(label, work, thing=thing):
@@ -100,6 +104,18 @@ class Page:
         with self.lock:
             self.history.redo()
             self._changed()
+
+    def refresh(self) -> None:
+        """Have all panels show the work: what they choose beside it has changed."""
+        with self.lock:
+            self._refresh()
+
+    def faces_changed(self) -> None:
+        """Show the page's face anew, and the names of the others: files of faces have changed."""
+        with self.lock:
+            self._shown = None
+            self._set_face(self.work.face)
+            self._refresh()
 
     def _changed(self) -> None:
         self.desk.store.save(self.name, self.work)
@@ -129,7 +145,20 @@ class Page:
     def show_face(self) -> None:
         """Show the work's expression on the page's face; what a clip showed there ends."""
         rig, face = self.rig, self.work.face
-        self.stage.request(FACE, lambda: rig.pose(face.meaning(rig)))
+        person = self.person()
+        self.stage.request(FACE, lambda: rig.pose(face.meaning(person, rig)))
+
+    def person(self) -> Person | None:
+        """Return the person of the page's face as their file is now; nobody, with a notice, if it will not do."""
+        try:
+            return self.desk.person(self.work.face.person, self.name)
+        except FacegenError as error:           # a person whose table went away or is broken
+            self.say(f"{error}; the common table is used instead.", "That person is gone", colour="red")
+            return None
+
+    def meaning(self) -> Resolution:
+        """Return what the page's face shows."""
+        return self.work.face.meaning(self.person(), self.rig)
 
     # -- the person ---------------------------------------------------------------------------------------------
     def calls(self, function: Callable[..., None]) -> Callable[[Any], None]:

@@ -9,8 +9,8 @@ from dataclasses import replace
 from functools import partial
 from typing import Any
 
-from facegen.errors import InputError
 from facegen.facs.blend import blend
+from facegen.facs.expression_table import Person
 from facegen.studio.page import Page
 from facegen.studio.thumbnails import Thumbnails
 from facegen.studio.vocabulary import plain, search, vocabulary
@@ -27,7 +27,7 @@ class Palette:
     def __init__(self, page: Page) -> None:
         self._page = page
         self._thumbnails = Thumbnails(page.desk.store.folder / _KEPT, page.fault)
-        self._person: str | None = None
+        self._person: Person | None = None
         self._rig: Any = None
         self._buttons: dict[str, Any] = {}
         self._pictures: dict[str, str] = {}
@@ -79,7 +79,8 @@ class Palette:
 
     def _show(self, label: str, shares: dict[str, float], *, thing: str | None = None) -> None:
         face = self._page.work.face
-        self._page.change(label, thing=thing, face=replace(face, units=blend(shares, person=face.person), blend=shares))
+        units = blend(shares, person=self._page.person())
+        self._page.change(label, thing=thing, face=replace(face, units=units, blend=shares))
 
     def _forget(self) -> None:
         self._page.change("mixture taken apart", face=replace(self._page.work.face, blend={}))
@@ -88,8 +89,9 @@ class Palette:
     def refresh(self, work: Work) -> None:
         """Show a work: its person's words, its face's pictures, its mixture."""
         face, rig = work.face, self._page.rig
-        if not self._buttons or face.person != self._person:
-            self._build(face)
+        person = self._page.person()
+        if not self._buttons or person != self._person:
+            self._build(person)
         elif rig is not self._rig:
             self._draw()
         self._rig = rig
@@ -97,14 +99,10 @@ class Palette:
             self._picture(name, button, on=name in face.blend)
         self._mixed(face)
 
-    def _build(self, face: FaceWork) -> None:
+    def _build(self, person: Person | None) -> None:
         """Make the buttons of a person's words."""
-        try:
-            words = vocabulary(face.person)
-        except InputError as error:                 # the file of a person went away
-            self._page.fault(error)
-            words = vocabulary()
-        self._person = face.person
+        self._person = person
+        words = vocabulary(person)
         gui = self._page.client.gui
         for name in [name for name in self._buttons if name not in words]:
             self._buttons.pop(name).remove()

@@ -102,12 +102,12 @@ class ScriptBox:
         face, rig = work.face, self._page.rig
         self._script.refresh(dict(face.units))
         self._raw.refresh(dict(face.raw))
-        now = face, rig.name
+        meaning = self._page.meaning()
+        now = meaning, face.blend, rig
         if now == self._shown:
             return
         self._shown = now
-        meaning = face.meaning(rig)
-        data = chain(meaning, rig)
+        data = chain(meaning, rig, face.person)
         # What reads like markup is text here.
         text = "\n".join(chain_lines(data)).replace("```", "")
         self._chain.content = f"```\n{from_names(face)}{text}\n```"

@@ -10,6 +10,7 @@ import numpy as np
 from PIL import Image
 
 from facegen.facs.deformation import Deformation
+from facegen.facs.expressions import Resolution
 from facegen.studio.page import Page
 from facegen.studio.script_box import write_raw
 from facegen.studio.work import FaceWork, Work
@@ -23,27 +24,28 @@ def command(face: FaceWork, *, size: str = "512", raw: str = "face.yaml") -> str
     what = raw if face.raw or face.gaze else face.script
     parts = ["facegen", "render", what]
     parts += ["--face", face.rig] if face.rig != _USUAL.rig else []
+    parts += ["--person", face.person] if face.person and what != raw else []
     # A file holds the movements as they are shown, intensity and all.
     parts += ["--intensity", f"{face.intensity:g}"] if face.intensity != 1.0 and what != raw else []
     parts += ["--size", size] if size != "512" else []
     return shlex.join([*parts, "-o", "face.png"])
 
 
-def movements(face: FaceWork, rig: Any) -> str:
+def movements(face: FaceWork, meaning: Resolution) -> str:
     """Return all that moves as the text of a deformation file: units, raw movements and gaze in one."""
     from facegen.face.chain import whole
 
-    found: Deformation = whole(face.meaning(rig))
+    found: Deformation = whole(meaning)
     about = f"# {face.script}" + (f" at intensity {face.intensity:g}" if face.intensity != 1.0 else "")
     return f"{about}, made in the facegen studio\n{write_raw(found.as_dict())}\n"
 
 
-def picture(face: FaceWork, rig: Any, size: str, view: tuple[float, float] = (0.0, 0.0)) -> bytes:
+def picture(rig: Any, meaning: Resolution, size: str, view: tuple[float, float] = (0.0, 0.0)) -> bytes:
     """Return the face as facegen's renderer draws it, a PNG. size: "512" or "640x480"."""
     from facegen.render.render import render
     from facegen.render.wishes import parse_size
 
-    pixels = render(rig, face.meaning(rig), size=parse_size(size), view=view)
+    pixels = render(rig, meaning, size=parse_size(size), view=view)
     buffer = io.BytesIO()
     Image.fromarray(pixels).save(buffer, "PNG")
     return buffer.getvalue()
@@ -73,11 +75,11 @@ class TakeAway:
 
     def _picture(self) -> None:
         view = view_of(self._page.client.camera) if self._as.value == "as here" else (0.0, 0.0)
-        data = picture(self._page.work.face, self._page.rig, self._size.value, view)
+        data = picture(self._page.rig, self._page.meaning(), self._size.value, view)
         self._page.client.send_file_download("face.png", data, save_immediately=True)
 
     def _movements(self) -> None:
-        text = movements(self._page.work.face, self._page.rig)
+        text = movements(self._page.work.face, self._page.meaning())
         self._page.client.send_file_download("face.yaml", text.encode(), save_immediately=True)
 
     def refresh(self, work: Work) -> None:

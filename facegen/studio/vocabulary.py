@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from facegen.facs.expression_table import Expression, fold_name, load_expressions, load_person
+from facegen.facs.expression_table import Expression, Person, fold_name, load_expressions
 
 
-def vocabulary(person: str | None = None) -> dict[str, Expression]:
+def vocabulary(person: Person | None = None) -> dict[str, Expression]:
     """Return name -> expression, the person's own habits in place of the common ones, with all synonyms."""
     table = load_expressions()
-    own = load_person(person).expressions if person else {}
-    return {**table.expressions, **own}
+    return {**table.expressions, **(person.expressions if person else {})}
 
 
 def plain(name: str) -> str:

@@ -13,9 +13,11 @@ from typing import Any, Self
 from facegen.errors import InputError, TableError
 from facegen.face.gaze import look_at
 from facegen.facs.deformation import Deformation, deformation_from_dict, weighted_sum
+from facegen.facs.expression_table import Person
 from facegen.facs.expressions import Resolution, resolve
 from facegen.facs.notation import canonical
 from facegen.facs.validate import Entry
+from facegen.studio.avatar_checks import check_avatar
 
 VERSION = 1
 """Of the file's form."""
@@ -30,7 +32,8 @@ FARTHEST = 1e6
 class FaceWork:
     """What the face shows.
 
-    rig: the name of a shipped face or avatar, or of what was opened on this page. person: whose habits, or None. units:
+    rig: the name of a shipped face or avatar, or of what was opened on this page. person: whose habits, a shipped
+    person's name or that of a file of the work's own (`Desk.people`), or None. units:
     unit code -> weight 0..1, as a script gives them. blend: expression -> share 0..1 that ``units`` came from; empty as
     soon as a unit is changed by hand. raw: movements on top, the form of a deformation file (docs/files.md). intensity:
     0..1, of units and raw data alike. gaze: {"x", "y", "z"}, mm, of the point at which the eyes look whatever else
@@ -56,9 +59,10 @@ class FaceWork:
         """The raw movements, intensity not applied."""
         return deformation_from_dict(self.raw) if self.raw else Deformation()
 
-    def meaning(self, rig: Any = None) -> Resolution:
-        """Return what a rig is to show; without one, the eyes do not look at the point that ``gaze`` says."""
-        found = resolve(dict(self.units) or "neutral", intensity=self.intensity)
+    def meaning(self, person: Person | None = None, rig: Any = None) -> Resolution:
+        """Return what a rig is to show. person: who ``person`` is (`Desk.person`); their units move their way. rig: the
+        face, whose eyes look at the point that ``gaze`` says; without one they do not."""
+        found = resolve(dict(self.units) or "neutral", person=person, intensity=self.intensity)
         raw = self.deformation * self.intensity
         if self.gaze and rig is not None:
             return _gazing(found, raw, self.gaze, rig)
@@ -103,16 +107,27 @@ class ClipWork:
 class AvatarWork:
     """An avatar on its way to blendshapes.
 
-    file: the name under which it was opened, or None. landmarks: name -> {"face": triangle, "barycentric": [a, b, c]},
-    what was clicked or confirmed. settings: of the rigging (opening, lid_closure, weights, sets).
+    file: the name under which it was opened, or a shipped avatar's, or None. up, front: axes of the file, "y" or "-z",
+    in which the head stands and looks. landmarks: name -> {"face": triangle, "barycentric": [a, b, c]}, what was
+    clicked or confirmed. skipped: optional landmarks that are not wanted -> True. symmetric: whether a partner moves
+    along. sets, opening, lid_closure, weights, pieces: as `facegen.rig` takes them, sets by commas.
     """
 
     file: str | None = None
+    up: str = "y"
+    front: str = "z"
     landmarks: Mapping[str, Any] = field(default_factory=dict)
-    settings: Mapping[str, Any] = field(default_factory=dict)
+    skipped: Mapping[str, bool] = field(default_factory=dict)
+    symmetric: bool = True
+    sets: str = "units,arkit,visemes"
+    opening: float = 1.0
+    lid_closure: float = 1.0
+    weights: Mapping[str, Any] = field(default_factory=dict)
+    pieces: Mapping[str, str] = field(default_factory=dict)
 
     def checked(self) -> Self:
         """Return itself, or raise InputError."""
+        check_avatar(self)
         return self
 
 

@@ -132,3 +132,26 @@ def shots(tmp_path_factory) -> Path:
     folder = Path(named) if named else tmp_path_factory.mktemp("shots")
     folder.mkdir(parents=True, exist_ok=True)
     return folder
+
+
+@pytest.fixture
+def studio(viser, tmp_path):
+    """A function that runs the whole studio on a free port, its works in a folder of its own: ``studio() -> Studio``.
+
+    ``browser_page(studio().server)`` opens it.
+    """
+    running = []
+
+    def start(**options):
+        from facegen.studio.app import Studio
+
+        made = Studio(tmp_path / "works", **{"port": 0, **options})
+        running.append(made)
+        made.start()
+        return made
+
+    yield start
+    for one in running:
+        one.stop()
+
+

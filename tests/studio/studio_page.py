@@ -19,6 +19,12 @@ SIZE = {"width": 900, "height": 600}
 SECONDS = 60.0          # long: a shared machine, and pixels drawn without a GPU
 # viser's sorter of Gaussian splats, of which the studio shows none, compiles text, and our policy lets no page do that.
 _NO_SPLATS = "Evaluating a string as JavaScript violates"
+# A busy machine may draw less than a frame a second: frames are counted, not only time.
+_FRAMES = """() => new Promise(done => {
+    let left = 4
+    const next = () => --left ? requestAnimationFrame(next) : done()
+    requestAnimationFrame(next)
+})"""
 _ONLY_CANVAS = "body * {visibility: hidden !important} canvas {visibility: visible !important}"
 
 
@@ -75,10 +81,11 @@ class StudioPage:
         return np.asarray(Image.open(io.BytesIO(shot)).convert("RGB"))
 
     def still(self, seconds: float = SECONDS) -> np.ndarray:
-        """The canvas once two looks at it, a while apart, are the same."""
+        """The canvas once two looks at it, a while and some drawn frames apart, are the same."""
         end, before = time.monotonic() + seconds, self.pixels()
         while time.monotonic() < end:
             self.page.wait_for_timeout(250)
+            self.page.evaluate(_FRAMES)
             now = self.pixels()
             if np.array_equal(now, before):
                 return now

@@ -75,14 +75,20 @@ class RawPage:
                     return message
         raise AssertionError(f"no {kind} came within {seconds:.0f} s")
 
-    def element(self, label: str, seconds: float = 10.0) -> str:
-        """Return the uuid of the GUI element with a label."""
-        end = time.monotonic() + seconds
-        while (left := end - time.monotonic()) > 0:
+    def elements(self, count: int, seconds: float = 10.0) -> dict[str, str]:
+        """Return the uuid of each of so many elements of the panel by its label."""
+        end, found = time.monotonic() + seconds, {}
+        while len(found) < count and (left := end - time.monotonic()) > 0:
             for message in self.receive(left):
-                if message["type"].startswith("Gui") and message.get("props", {}).get("label") == label:
-                    return message["uuid"]
-        raise AssertionError(f"no element '{label}' came within {seconds:.0f} s")
+                props = message.get("props")
+                if message["type"].startswith("Gui") and isinstance(props, dict) and props.get("label"):
+                    found[props["label"]] = message["uuid"]
+        assert len(found) >= count, found
+        return found
+
+    def element(self, label: str) -> str:
+        """Return the uuid of the panel's only element, which has this label."""
+        return self.elements(1)[label]
 
     def begin(self) -> RawPage:
         """Say where the camera is: viser counts a page from then on."""
@@ -99,6 +105,11 @@ class RawPage:
         except ConnectionClosed as error:
             return error.rcvd.code if error.rcvd else 1006
         return None
+
+    def vanish(self) -> None:
+        """Go away without a word, as a browser that is killed."""
+        with contextlib.suppress(OSError):
+            self.socket.socket.shutdown(socket.SHUT_RDWR)
 
     def close(self) -> None:
         """Go away."""
