@@ -65,14 +65,13 @@ def facegen(avatar: str, output: str, solver: str, sets: str, cache: str) -> dic
     from facegen.transfer import rig, transfer
 
     clock.on(transfer, "lay_skin", "registration")
-    clock.on(rig, "transfer", "transfer")
+    clock.on(transfer.Binding, "shapes", "shapes")
     clock.on(rig, "save_avatar", "save")
     begun = time.process_time()
     made = rig.rig(avatar, output, landmarks=Path(avatar).with_suffix(".yaml"), sets=sets.split(","))
     found = clock.seconds
     for unit, whole in (("", time.perf_counter() - start), ("_cpu", time.process_time() - begun)):
-        found[f"shapes{unit}"] = found[f"transfer{unit}"] - found[f"registration{unit}"]
-        found[f"load{unit}"] = whole - found[f"transfer{unit}"] - found[f"save{unit}"]
+        found[f"load{unit}"] = whole - sum(found[f"{step}{unit}"] for step in ("registration", "shapes", "save"))
     return {**found, "count": len(made.names)}
 
 

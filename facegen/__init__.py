@@ -50,7 +50,7 @@ if TYPE_CHECKING:
     from facegen.jobs.rigging import rig
     from facegen.render import Renderer, Wireframe, render, render_passes, save_passes
     from facegen.render.live import Live
-    from facegen.transfer.rig import avatar_names
+    from facegen.transfer.rig import Rigging, avatar_names
 
 __version__ = "0.1.0"
 
@@ -78,6 +78,7 @@ __all__ = [
     "Recipe",
     "Renderer",
     "Resolution",
+    "Rigging",
     "TableError",
     "WeakCamera",
     "Wireframe",
@@ -160,7 +161,7 @@ _HOMES = {
     "facegen.render.passes": ("render_passes",),
     "facegen.render.passfiles": ("save_passes",),
     "facegen.render.render": ("Renderer",),
-    "facegen.transfer.rig": ("avatar_names",),
+    "facegen.transfer.rig": ("Rigging", "avatar_names"),
     "facegen": ("render",),                 # the package itself: calling it draws
 }
 _HOME = {name: module for module, names in _HOMES.items() for name in names}

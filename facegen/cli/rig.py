@@ -30,6 +30,8 @@ EnergyWeights = Annotated[str | None, typer.Option(
     "--weights", metavar="WEIGHTS",
     help="Of the energies: ours, paper, a .yaml file, or by name, such as landmarks=20,anchor=0.03. [default: ours]")]
 Opening = Annotated[float, typer.Option("--opening", metavar="FACTOR", help="How far the jaw opens, of the estimate.")]
+LidClosure = Annotated[float, typer.Option(
+    "--lid-closure", metavar="FACTOR", help="How far lids close; at 1 they meet where facegen's own do.")]
 Pieces = Annotated[list[str] | None, typer.Option(
     "--piece", metavar="PART=KIND", help="What a part is (skin, eye_L, teeth_upper, skull, carried ...); repeatable.")]
 Preview = Annotated[Path | None, typer.Option(
@@ -42,9 +44,9 @@ NoCache = Annotated[bool, typer.Option(
 
 def rig(avatar: Avatar, output: Out = None, landmarks: Marks = None, sets: Sets = None, shapes: Shapes = None,
         person: PersonName = None, template: OtherTemplate = None, template_landmarks: OtherMarks = None,
-        method: Method = "landmarks", weights: EnergyWeights = None, opening: Opening = 1.0, piece: Pieces = None,
-        preview: Preview = None, no_normals: NoNormals = False, quantise: Quantise = False, no_cache: NoCache = False,
-        json: Json = False, quiet: Quiet = False) -> None:
+        method: Method = "landmarks", weights: EnergyWeights = None, opening: Opening = 1.0,
+        lid_closure: LidClosure = 1.0, piece: Pieces = None, preview: Preview = None, no_normals: NoNormals = False,
+        quantise: Quantise = False, no_cache: NoCache = False, json: Json = False, quiet: Quiet = False) -> None:
     """Give an avatar the expressions as blendshapes.
 
     For example: facegen rig cat.obj --landmarks cat.yaml -o cat.glb
@@ -56,8 +58,8 @@ def rig(avatar: Avatar, output: Out = None, landmarks: Marks = None, sets: Sets 
 
     made = make(avatar, output, landmarks=landmarks, sets=_listed(sets), shapes=_listed(shapes), person=person,
                 template=template, template_landmarks=template_landmarks, method=method, weights=weights,
-                opening=opening, pieces=read_pieces(piece), preview=preview, normals=not no_normals, quantise=quantise,
-                cache=not no_cache)
+                opening=opening, lid_closure=lid_closure, pieces=read_pieces(piece), preview=preview,
+                normals=not no_normals, quantise=quantise, cache=not no_cache)
     if not quiet:
         warn(made.warnings)
     if json:

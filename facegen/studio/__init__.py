@@ -1,1 +1,4 @@
-"""The studio: shape a face and rig an avatar in the browser."""
+"""The studio: a page on this machine where a face is shaped and an avatar is rigged.
+
+Needs ``pip install facegen[studio]``. Nothing else of facegen imports it.
+"""

@@ -1,19 +1,147 @@
-"""An avatar gets its blendshapes."""
+"""An avatar gets its blendshapes: open it, place its landmarks, rig it."""
 
 from __future__ import annotations
 
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from facegen.face.landmarks import REQUIRED
+from facegen.fileio.textfile import make_folder, save_text
+from facegen.studio import picking
+from facegen.studio.avatar_file import FOLDER, TAKEN, called, keep, open_avatar
+from facegen.studio.avatar_scene import AvatarScene
 from facegen.studio.page import Page
-from facegen.studio.work import Work
+from facegen.studio.picker_view import PickerView
+from facegen.studio.rigging_view import RiggingView
+from facegen.studio.task import Task
+from facegen.studio.work import AvatarWork, Work
+from facegen.transfer.landmarks import load_landmarks
+from facegen.transfer.rig import avatar_names
+
+_NONE = "-"
+_DIRECTIONS = {"x": "+x", "-x": "-x", "y": "+y", "-y": "-y", "z": "+z", "-z": "-z"}
+_HELP = ("Open the head of a character. Then show where its eyes, brows, nose, mouth and chin are, and it gets the "
+         "same expressions as facegen's own face.")
 
 
 class AvatarPanel:
-    """An avatar gets its blendshapes."""
+    """Three steps, one below the other."""
 
     def __init__(self, page: Page) -> None:
         self.page = page
+        self.folder = page.desk.store.folder_of(page.name)
+        self.scene = AvatarScene(page)
+        gui = page.client.gui
+        with gui.add_folder("1 Avatar") as self._first:
+            self._make_open(gui)
+        with gui.add_folder("2 Landmarks"):
+            self.picker = PickerView(page, self.scene)
+            with gui.add_folder("Landmarks as a file", expand_by_default=False):
+                self._make_files(gui)
+        with gui.add_folder("3 Blendshapes"):
+            self.rigging = RiggingView(page, self.scene)
 
+    def _make_open(self, gui: Any) -> None:
+        calls = self.page.calls
+        self._about = gui.add_markdown(_HELP)
+        self._upload = gui.add_upload_button("Open an avatar", mime_type=",".join(TAKEN), hint="A file that ends in "
+                                             f"{', '.join(TAKEN)}. It stays on this machine, beside your work.")
+        self._upload.on_upload(calls(self._uploaded))
+        self._ours = gui.add_dropdown("Or try one", (_NONE, *avatar_names()), initial_value=_NONE,
+                                      hint="Heads that come with facegen, still without blendshapes.")
+        self._ours.on_update(calls(self._chosen))
+        self._seen = gui.add_checkbox("Show it in the picture", True)
+        self._seen.on_update(calls(lambda: self.refresh(self.page.work)))
+        with gui.add_folder("It lies down or looks away", expand_by_default=False) as self._axes:
+            self._up = gui.add_dropdown("Up in the file", tuple(_DIRECTIONS.values()), initial_value="+y",
+                                        hint="Programs differ: many files have +y up, some +z.")
+            self._front = gui.add_dropdown("It looks to", tuple(_DIRECTIONS.values()), initial_value="+z")
+            for handle in (self._up, self._front):
+                handle.on_update(calls(self._turned))
+
+    def _make_files(self, gui: Any) -> None:
+        calls = self.page.calls
+        self._save = gui.add_button("Save landmarks", hint="A small text file, for another day and for facegen rig.")
+        self._save.on_click(calls(self._save_landmarks))
+        self._load = gui.add_upload_button("Load landmarks", mime_type=".yaml,.yml")
+        self._load.on_upload(calls(self._load_landmarks))
+        self._clear = gui.add_button("Remove all points")
+        self._clear.on_click(calls(self._remove_all))
+
+    # -- what is shown ------------------------------------------------------------------------------------------
     def refresh(self, work: Work) -> None:
         """Show a work."""
+        avatar = work.avatar
+        if self.scene.open(avatar):
+            self.picker.forget()
+            self.rigging.forget()
+        opened = self.scene.opened
+        self._about.content = opened.summary if opened else _HELP
+        self._ours.value = avatar.file if avatar.file in avatar_names() else _NONE
+        self._up.value, self._front.value = _DIRECTIONS[avatar.up], _DIRECTIONS[avatar.front]
+        for handle in (self._seen, self._axes):
+            handle.visible = opened is not None
+        self._save.disabled = self._clear.disabled = not avatar.landmarks
+        self.scene.show(avatar, bool(self._seen.value) and not self.rigging.compares)
+        self.picker.refresh(work)
+        self.rigging.refresh(work)
+
+    # -- step 1 -------------------------------------------------------------------------------------------------
+    def _uploaded(self) -> None:
+        given = self._upload.value
+
+        def read(report: Any) -> str:
+            report("reading", 0.3)
+            return keep(self.folder, given.name, given.content)
+
+        with self._first:
+            Task(self.page, given.name[:60], read, self._opened)
+
+    def _chosen(self) -> None:
+        if self._ours.value != _NONE:
+            self._opened(self._ours.value)
+
+    def _opened(self, name: str) -> None:
+        self._seen.value = True
+        self.picker.forget()
+        self.rigging.forget()
+        self.picker.start()
+        keeps = self.page.work.avatar
+        fresh = AvatarWork(file=name, symmetric=keeps.symmetric, sets=keeps.sets)
+        self.page.change(f"open {name}", avatar=self._facing(fresh))
+        self.refresh(self.page.work)                        # the same name may be another file
+
+    def _facing(self, avatar: AvatarWork) -> AvatarWork:
+        """Return the work with the axes that a file is known to have: VRM 0.x avatars look to -z."""
+        return replace(avatar, front="-z") if open_avatar(self.folder, avatar.file).avatar.is_vrm0 else avatar
+
+    def _turned(self) -> None:
+        keys = {label: key for key, label in _DIRECTIONS.items()}
+        avatar = replace(self.page.work.avatar, up=keys[self._up.value], front=keys[self._front.value])
+        self.page.change("turn the avatar", avatar=avatar)
+
+    # -- landmarks as a file ------------------------------------------------------------------------------------
+    def _save_landmarks(self) -> None:
+        avatar = self.page.work.avatar
+        text = picking.file_text(avatar, self.scene.opened.avatar.digest)
+        self.page.client.send_file_download(f"{Path(avatar.file).stem}.yaml", text.encode(), save_immediately=True)
+
+    def _load_landmarks(self) -> None:
+        given, mesh = self._load.value, self.scene.mesh
+        path = make_folder(self.folder / FOLDER) / "landmarks.yaml"
+        save_text(given.content.decode("utf-8", "replace"), path)
+        opened = self.scene.opened
+        with called(path, given.name):
+            found = load_landmarks(path, mesh, mesh_name=opened.path.name, digest=opened.avatar.digest)
+        avatar = replace(self.page.work.avatar, landmarks=picking.as_places(found))
+        self.page.change("load landmarks", avatar=avatar)
+        self.page.say(f"{len(found.names)} points, all {len(REQUIRED)} that are needed among them.", "Landmarks loaded")
+
+    def _remove_all(self) -> None:
+        self.page.change("remove all points", avatar=replace(self.page.work.avatar, landmarks={}, skipped={}))
 
     def close(self) -> None:
-        """Nothing runs."""
+        """End what runs."""
+        self.picker.close()
+        self.rigging.close()

@@ -22,6 +22,9 @@ FACES = "faces"
 PEOPLE = "people"
 """Folder of a work that holds its own people's tables."""
 
+RIGGED = (".glb", ".vrm")
+"""What their names end in."""
+
 _AVATARS = "avatars"
 _FILE = re.compile(r"[\w][\w -]{0,59}\.yaml")
 
@@ -43,7 +46,8 @@ class Desk:
         from facegen.transfer.rig import avatar_names
 
         own = self.store.folder / work / FACES
-        return (*face_names(), *avatar_names(), *sorted(path.name for path in own.glob("*.glb")))
+        rigged = sorted(path.name for path in own.glob("*") if path.suffix in RIGGED)
+        return (*face_names(), *avatar_names(), *rigged)
 
     def face(self, name: str, work: str, *, wait: Callable[[str], None] = lambda why: None) -> Any:
         """Return a face by name, loaded once. A shipped avatar is rigged when it is first asked for.
@@ -53,7 +57,7 @@ class Desk:
         if name not in self.face_names(work):
             raise InputError(f"face: unknown face '{name}'{nearest(name, self.face_names(work))}")
         own = self.store.folder / work / FACES / name
-        key = own if own.suffix == ".glb" else name
+        key = own if own.suffix in RIGGED else name
         with self._lock:
             lock = self._locks.setdefault(key, threading.Lock())
         with lock:                              # who asks second waits and finds it

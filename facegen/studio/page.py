@@ -101,6 +101,18 @@ class Page:
             self.history.redo()
             self._changed()
 
+    def refresh(self) -> None:
+        """Have all panels show the work: what they choose beside it has changed."""
+        with self.lock:
+            self._refresh()
+
+    def faces_changed(self) -> None:
+        """Show the page's face anew, and the names of the others: files of faces have changed."""
+        with self.lock:
+            self._shown = None
+            self._set_face(self.work.face)
+            self._refresh()
+
     def _changed(self) -> None:
         self.desk.store.save(self.name, self.work)
         self._set_face(self.work.face)

@@ -24,8 +24,35 @@ LEAST = 1 / 30
 """Seconds from picture to picture: a browser shows no more, and the wire is not filled."""
 
 # Where the camera stands, mm: in front, its lens that of a portrait.
-_DISTANCE, _LENS = 700.0, np.radians(28.0)
+_DISTANCE, _LENS = 700.0, float(np.radians(28.0))
+_MIDDLE = (0.0, -15.0, 0.0)
+_NEAR = 0.5             # of the scene: nearer would cost the depth its exactness, and the mouth would show on the cheek
 _BACKGROUND = 236
+
+
+def set_scene(server: Any) -> None:
+    """Give all pages of a viser server their light and where their camera begins: before any comes, for what is sent
+    to a page that has just come may be overtaken by the page's own beginning."""
+    scene = server.scene
+    scene.set_up_direction("+y")
+    scene.configure_default_lights(enabled=False)
+    scene.configure_environment_map(hdri=None)
+    scene.set_background_image(np.full((2, 2, 3), _BACKGROUND, np.uint8), format="png")
+    scene.add_light_ambient("/lights/all", color=(255, 250, 245), intensity=1.1)
+    for name, place, strength in (("key", (-3.0, 5.0, 7.0), 2.2), ("fill", (6.0, 1.0, 5.0), 0.9),
+                                  ("rim", (0.0, 4.0, -7.0), 0.7)):
+        scene.add_light_directional(f"/lights/{name}", color=(255, 252, 248), intensity=strength, position=place)
+    camera, (position, at) = server.initial_camera, _view(_MIDDLE)
+    camera.up, camera.position, camera.look_at, camera.fov, camera.near = (0.0, 1.0, 0.0), position, at, _LENS, _NEAR
+
+
+def _view(at: ArrayLike, yaw: float = 0.0, pitch: float = 0.0, distance: float = _DISTANCE
+          ) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
+    """Return where the camera stands and looks, in the scene."""
+    yaw, pitch = np.radians(yaw), np.radians(pitch)
+    way = np.array([np.sin(yaw) * np.cos(pitch), np.sin(pitch), np.cos(yaw) * np.cos(pitch)])
+    middle = np.asarray(at, np.float64) * SCALE
+    return tuple((middle + way * distance * SCALE).tolist()), tuple(middle.tolist())
 
 
 class Stage:
@@ -44,32 +71,15 @@ class Stage:
         self._changed = threading.Condition()
         self._drawing = threading.RLock()           # who changes figures
         self._closed = False
-        self._light()
-        self.look()
         threading.Thread(target=self._run, name="facegen studio stage", daemon=True).start()
 
-    def _light(self) -> None:
-        scene = self.client.scene
-        scene.set_up_direction("+y")
-        scene.configure_default_lights(enabled=False)
-        scene.configure_environment_map(hdri=None)
-        scene.set_background_image(np.full((2, 2, 3), _BACKGROUND, np.uint8), format="png")
-        scene.add_light_ambient("/lights/all", color=(255, 250, 245), intensity=1.1)
-        for name, place, strength in (("key", (-3.0, 5.0, 7.0), 2.2), ("fill", (6.0, 1.0, 5.0), 0.9),
-                                      ("rim", (0.0, 4.0, -7.0), 0.7)):
-            scene.add_light_directional(f"/lights/{name}", color=(255, 252, 248), intensity=strength, position=place)
-
-    def look(self, at: ArrayLike = (0.0, -15.0, 0.0), *, yaw: float = 0.0, pitch: float = 0.0,
+    def look(self, at: ArrayLike = _MIDDLE, *, yaw: float = 0.0, pitch: float = 0.0,
              distance: float = _DISTANCE) -> None:
         """Turn the camera to a place, mm, from an angle, degrees: yaw to the subject's left, pitch up."""
-        yaw, pitch = np.radians(yaw), np.radians(pitch)
-        way = np.array([np.sin(yaw) * np.cos(pitch), np.sin(pitch), np.cos(yaw) * np.cos(pitch)])
-        camera, middle = self.client.camera, np.asarray(at, np.float64) * SCALE
+        position, middle = _view(at, yaw, pitch, distance)
         with self.client.atomic():
-            camera.fov = _LENS
-            camera.up_direction = (0.0, 1.0, 0.0)
-            camera.position = tuple(middle + way * distance * SCALE)
-            camera.look_at = tuple(middle)
+            self.client.camera.position = position
+            self.client.camera.look_at = middle
 
     # -- figures ------------------------------------------------------------------------------------------------
     def put(self, name: str, mesh: Mesh, *, colours: Any = None, offset: ArrayLike = (0.0, 0.0, 0.0),

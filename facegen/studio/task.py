@@ -18,12 +18,12 @@ class Task:
 
     job: ``job(report) -> result``, run in a thread of its own; it calls ``report(text, share)`` often, share 0..1 or
     None where that is not known, and lets the `Stopped` that this raises pass. done: called with the result, with the
-    page's lock. A fault is told to the person.
+    page's lock. ended: called after it, after a fault and after a stop. A fault is told to the person.
     """
 
     def __init__(self, page: Page, title: str, job: Callable[[Callable[..., None]], Any],
-                 done: Callable[[Any], None]) -> None:
-        self._page, self._title, self._job, self._done = page, title, job, done
+                 done: Callable[[Any], None], ended: Callable[[], None] = lambda: None) -> None:
+        self._page, self._title, self._job, self._done, self._ended = page, title, job, done, ended
         self._stop = threading.Event()
         gui = page.client.gui
         self._bar = gui.add_progress_bar(0.0, animated=True)
@@ -64,3 +64,5 @@ class Task:
         finally:
             for part in (self._bar, self._text, self._button):
                 part.remove()
+            with self._page.lock:
+                self._ended()

@@ -16,6 +16,7 @@ from facegen.facs.expression_table import Person
 from facegen.facs.expressions import Resolution, resolve
 from facegen.facs.notation import canonical
 from facegen.facs.validate import Entry
+from facegen.studio.avatar_checks import check_avatar
 
 VERSION = 1
 """Of the file's form."""
@@ -82,16 +83,27 @@ class ClipWork:
 class AvatarWork:
     """An avatar on its way to blendshapes.
 
-    file: the name under which it was opened, or None. landmarks: name -> {"face": triangle, "barycentric": [a, b, c]},
-    what was clicked or confirmed. settings: of the rigging (opening, lid_closure, weights, sets).
+    file: the name under which it was opened, or a shipped avatar's, or None. up, front: axes of the file, "y" or "-z",
+    in which the head stands and looks. landmarks: name -> {"face": triangle, "barycentric": [a, b, c]}, what was
+    clicked or confirmed. skipped: optional landmarks that are not wanted -> True. symmetric: whether a partner moves
+    along. sets, opening, lid_closure, weights, pieces: as `facegen.rig` takes them, sets by commas.
     """
 
     file: str | None = None
+    up: str = "y"
+    front: str = "z"
     landmarks: Mapping[str, Any] = field(default_factory=dict)
-    settings: Mapping[str, Any] = field(default_factory=dict)
+    skipped: Mapping[str, bool] = field(default_factory=dict)
+    symmetric: bool = True
+    sets: str = "units,arkit,visemes"
+    opening: float = 1.0
+    lid_closure: float = 1.0
+    weights: Mapping[str, Any] = field(default_factory=dict)
+    pieces: Mapping[str, str] = field(default_factory=dict)
 
     def checked(self) -> Self:
         """Return itself, or raise InputError."""
+        check_avatar(self)
         return self
 
 

@@ -10,7 +10,7 @@ where the template's have not parted.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -37,6 +37,8 @@ _TOLERATED = 0.05
 _OF_OPEN, _TOLERATED_OPEN = 0.2, 0.6
 # Millimetres by which a rim may move otherwise than its edge: a lid rolls as it closes.
 _ROLLS = 0.5
+# Lids that close by less than this share of the gap keep still.
+_STILL = 0.01
 # A slit counts as shut where the template leaves no more than this share of it, and this many mm.
 _SHUT, _SHUT_MM = 0.06, 0.3
 # Lids keep the distance from the ball that they have at rest, up to so many radii from its centre.
@@ -55,12 +57,42 @@ _TINY = 1e-300
 @dataclass(frozen=True, eq=False)
 class _Wanted:
     """What k shapes ask of a slit: the ``gap`` (k, SAMPLES, 3), mm; how much it counts, ``active`` (k, SAMPLES); how
-    much of the way the upper edge goes (k,); and where the slit is ``shut`` (k, SAMPLES)."""
+    much of the way the upper edge goes (k,); ``left`` (k, SAMPLES): the share of the gap at rest that the template
+    leaves. ``more`` (k, SAMPLES, 3), mm: what the user wants to be added to the gap, None if nothing."""
 
     gap: Array
     active: Array
     upper_share: Array
-    shut: NDArray[np.bool_]
+    left: Array
+    more: Array | None = None
+
+    def of(self, shapes: NDArray) -> _Wanted:
+        """Return what some of the shapes ask."""
+        return _Wanted(self.gap[shapes], self.active[shapes], self.upper_share[shapes], self.left[shapes],
+                       None if self.more is None else self.more[shapes])
+
+    def closed_more(self, rest: Array, factor: float) -> _Wanted:
+        """Return what is asked where lids close so many times as far, up to shut. rest (SAMPLES, 3): the gap then."""
+        closing = np.where(self.narrows, 1.0 - self.left, 0.0)
+        share = np.where(closing * factor < 1.0, factor, 1.0 / np.maximum(closing, _TINY)) - 1.0
+        counts = (self.active * share * (closing > 0))[:, :, None]
+        return replace(self, left=np.where(closing > 0, 1.0 - closing * (share + 1.0), self.left),
+                       more=counts * (self.gap - rest))
+
+    @property
+    def narrows(self) -> NDArray[np.bool_]:
+        """Where (k, SAMPLES) lids close."""
+        return (self.left < 1.0 - _STILL) & (self.active > 0)
+
+    @property
+    def target(self) -> Array:
+        """The gap (k, SAMPLES, 3) that is wanted after all."""
+        return self.gap if self.more is None else self.gap + self.more
+
+    @property
+    def shut(self) -> NDArray[np.bool_]:
+        """Where (k, SAMPLES) the slit is shut."""
+        return (self.left <= _SHUT) & (np.linalg.norm(self.target, axis=2) <= _SHUT_MM) & (self.active > 0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,20 +107,37 @@ class Closing:
     eye: EyeFront | None
     wanted: _Wanted
 
+    @cached_property
+    def _gap(self) -> Array:
+        """The gap (SAMPLES, 3) at rest."""
+        return self.margins.gap(self.rest)
+
+    def of(self, shapes: NDArray[np.int64], lid_closure: float = 1.0) -> Closing:
+        """Return how the slit closes in some of the shapes, if lids close so many times as far."""
+        wanted = self.wanted.of(shapes)
+        return replace(self, wanted=wanted if lid_closure == 1.0 else wanted.closed_more(self._gap, lid_closure))
+
+    def narrows(self) -> NDArray[np.bool_]:
+        """Return in which shapes (k,) lids close."""
+        return self.wanted.narrows.any(axis=1)
+
     def closes(self) -> NDArray[np.bool_]:
         """Return which shapes (k,) shut the slit."""
         return self.wanted.shut.any(axis=1)
 
     def close(self, motion: Array) -> None:
         """Add to the displacements (k, n, 3) of the skin what they miss, in place."""
-        wanted, gap = self.wanted, self.margins.gap(self.rest)
+        wanted, gap = self.wanted, self._gap
         for k in np.flatnonzero(wanted.active.max(axis=1) > 0):
             missing = wanted.active[k, :, None] * (wanted.gap[k] - gap - self.margins.gap(motion[k]))
             still_open = np.linalg.norm(wanted.gap[k], axis=1)
             counts = _beyond(missing, np.minimum(_TOLERATED + _OF_OPEN * still_open, _TOLERATED_OPEN))
+            missing = missing * counts[:, None]
+            if wanted.more is not None:
+                missing += wanted.more[k]
+                counts = np.maximum(counts, _beyond(wanted.more[k]))
             if counts.max() < _NOTHING:
                 continue
-            missing = missing * counts[:, None]
             share = wanted.upper_share[k]
             self._move(motion[k], self.field.steps(share * missing, (share - 1.0) * missing))
             if self.eye is not None:
@@ -107,7 +156,7 @@ class Closing:
     def seal(self, motion: Array, rows: NDArray[np.int64]) -> None:
         """Bring edges that are shut onto one line, no nearer to the eye than either, in displacements (k, all, 3) of
         vertices of which ``rows`` (n,) are the skin's, in place."""
-        shut = self.wanted.shut
+        shut, target = self.wanted.shut, self.wanted.target
         for k in np.flatnonzero(shut.any(axis=1)):
             upper, lower = self.margins.ends(self.rest + motion[k, rows])
             line = (upper + lower) / 2
@@ -115,7 +164,7 @@ class Closing:
                 centre = self.eye.ball.centre
                 farther = np.maximum(*(np.linalg.norm(edge - centre, axis=1) for edge in (upper, lower)))
                 line = centre + farther[:, None] * _unit(line - centre)
-            on = (shut[k] * _beyond(upper - lower - self.wanted.gap[k]))[:, None]
+            on = (shut[k] * _beyond(upper - lower - target[k]))[:, None]
             motion[k, rows[self.field.rows]] += self.field.steps(on * (line - upper), on * (line - lower))
 
     @cached_property
@@ -184,7 +233,7 @@ def _told_lips(gap: Array, upper: Array, lower: Array, own_gap: Array, part: Arr
     change = upper - lower
     parted = np.linalg.norm(change, axis=2) / _PARTED
     return _Wanted(own_gap + change @ part.T, smooth_step(1.0 - parted), np.full(len(change), 0.5),
-                   np.zeros(parted.shape, bool))
+                   np.ones(parted.shape))
 
 
 def _told_lids(gap: Array, upper: Array, lower: Array, own_gap: Array, part: Array) -> _Wanted:
@@ -197,15 +246,14 @@ def _told_lids(gap: Array, upper: Array, lower: Array, own_gap: Array, part: Arr
     open_at = np.flatnonzero(length > _CORNER)
     if not len(open_at):
         none = np.zeros(ratio.shape)
-        return _Wanted(np.broadcast_to(own_gap, moved.shape), none, np.full(len(moved), 0.5), none > 0)
+        return _Wanted(np.broadcast_to(own_gap, moved.shape), none, np.full(len(moved), 0.5), np.ones(ratio.shape))
     ratio = ratio[:, open_at[np.abs(np.arange(SAMPLES)[:, None] - open_at).argmin(axis=1)]]
     across = moved - ratio[:, :, None] * gap
     target = ratio[:, :, None] * own_gap + across @ part.T
     active = smooth_step(np.abs(1.0 - ratio) / _LEAST_CHANGE)
-    shut = (ratio <= _SHUT) & (np.linalg.norm(target, axis=2) <= _SHUT_MM) & (active > 0)
     ways = [np.abs((edge * toward).sum(axis=2)).sum(axis=1) for edge in (upper, lower)]
     share = np.where(sum(ways) > _TINY, ways[0] / np.maximum(sum(ways), _TINY), 0.5)
-    return _Wanted(target, active, share, shut)
+    return _Wanted(target, active, share, ratio)
 
 
 def _beyond(missing: Array, tolerated: ArrayLike = _TOLERATED) -> Array:

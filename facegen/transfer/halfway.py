@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from facegen.geometry.fade import smooth_step
 from facegen.transfer.closing import Closing
-from facegen.transfer.keep_apart import keep_apart
+from facegen.transfer.keep_apart import Guard
 from facegen.transfer.piece_motion import PieceMotion
 
 Array = NDArray[np.float64]
@@ -29,19 +29,18 @@ def half_name(shape: str) -> str:
     return f"{shape}_half"
 
 
-def halfway(pieces: PieceMotion, lids: Sequence[Closing], rows: NDArray, motion: Array,
-            still: NDArray[np.bool_]) -> dict[int, Array]:
+def halfway(pieces: PieceMotion, guard: Guard, lids: Sequence[Closing], rows: NDArray, motion: Array,
+            closing: NDArray[np.bool_]) -> dict[int, Array]:
     """Return shape -> corrective (n, 3), mm, for the shapes that need one.
 
     lids: of the skin, whose vertices are ``rows`` of all, each before an eye. motion (k, n, 3): final displacements.
-    still (k,): shapes that move neither jaw nor eyes; others, expressions for example, are given none.
+    closing (k,): shapes that shut lids and move neither jaw nor eyes; others, expressions for example, are given none.
     """
-    closing = still & np.any([one.closes() for one in lids] or [np.zeros(len(motion), bool)], axis=0)
     some = np.flatnonzero(closing)
     if not len(some):
         return {}
     straight = motion[some] / 2
-    _, found = keep_apart(pieces, straight)
+    found = guard(straight.copy())
     deep = np.max([found[f"eye_{s}"].before / ball.radius for s, ball in pieces.eyes.items() if f"eye_{s}" in found]
                   or [np.zeros(len(some))], axis=0)
     some, straight = some[deep > _SEEN], straight[deep > _SEEN]
@@ -52,7 +51,8 @@ def halfway(pieces: PieceMotion, lids: Sequence[Closing], rows: NDArray, motion:
         _round_the_eye(one, skin, motion[some][:, rows])
     bent = straight.copy()
     bent[:, rows] = skin
-    bent, _ = keep_apart(pieces, pieces.move(bent))
+    bent = pieces.move(bent)
+    guard(bent)
     # Only what the skin's lids and what they carry do: jaw and eyes keep still in these shapes.
     return {int(k): there - here for k, there, here in zip(some, bent, straight, strict=True)}
 

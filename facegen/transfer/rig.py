@@ -16,12 +16,13 @@ from facegen.face.face import load_face
 from facegen.fileio.avatar import AvatarFile, check_output, load_avatar, save_avatar
 from facegen.fileio.kept import kept_in
 from facegen.progress import Progress, silent, within
+from facegen.transfer.choices import Choices
 from facegen.transfer.halfway import half_name
 from facegen.transfer.landmarks import check_places, load_landmarks
 from facegen.transfer.pieces import describe
 from facegen.transfer.template import Template, template_of
 from facegen.transfer.template_file import read_template
-from facegen.transfer.transfer import Transferred, transfer
+from facegen.transfer.transfer import Binding, Transferred
 from facegen.transfer.weights import WeightsLike, read_weights
 
 DEFAULT_SETS = ("units", "arkit", "visemes")
@@ -71,47 +72,98 @@ def avatar_files(avatar: str | Path, landmarks: str | Path | None, *, what: str 
     return path, marks
 
 
+class Rigging:
+    """An avatar on its way to blendshapes: read and laid on the template once, its shapes as often as wanted, of which
+    only those that a choice changes are computed anew. Not for two threads at a time. ::
+
+        rigging = facegen.Rigging("cat.obj", landmarks="cat.yaml")
+        rigging.shapes(["jawOpen"], opening=1.2).shapes["jawOpen"]          # (n, 3), the avatar's axes and units
+        rigging.save("cat.glb", opening=1.2)
+    """
+
+    def __init__(self, avatar: str | Path, *, landmarks: str | Path | None = None, sets: Sequence[str] | None = None,
+                 shapes: Sequence[str] | None = None, person: str | Path | None = None,
+                 template: str | Path | None = None, template_landmarks: str | Path | None = None,
+                 pieces: Mapping[str, str] | None = None, cache: bool = True) -> None:
+        """Read and check everything; the work is done when it is asked for. All as in `rig`."""
+        path, marks = avatar_files(avatar, landmarks)
+        self._asked = asked = _asked(sets, shapes, person, template, template_landmarks)
+        self.source = load_avatar(path)
+        self.places = load_landmarks(marks, self.source.mesh, mesh_name=path.name, digest=self.source.digest)
+        self.warnings = (*check_places(self.places, self.source.mesh), *_without_expressions(self.source, asked.sets))
+        self._pieces, self._cache = pieces, cache
+        self._binding: Binding | None = None
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The shapes that can be had."""
+        return tuple(self._asked.sets)
+
+    def shapes(self, only: Sequence[str] | None = None, *, method: str = "landmarks",
+               weights: WeightsLike | None = None, opening: float = 1.0, lid_closure: float = 1.0,
+               progress: Progress = silent) -> Transferred:
+        """Return the shapes, or those of some names. Everything else as in `rig`. Raises InputError."""
+        return self._shapes(only, Choices(method, read_weights(weights), opening, lid_closure), progress)
+
+    def save(self, output: str | Path, *, method: str = "landmarks", weights: WeightsLike | None = None,
+             opening: float = 1.0, lid_closure: float = 1.0, normals: bool = True, quantise: bool = False,
+             progress: Progress = silent) -> Rigged:
+        """Write the avatar with all its shapes. Everything as in `rig`. Raises InputError; nothing is written then."""
+        choices = Choices(method, read_weights(weights), opening, lid_closure)
+        sets, source = self._asked.sets, self.source
+        check_output(source, output, sets)
+        found = self._shapes(None, choices, within(progress, 0.0, 0.9))
+        made = {name: found.shapes[name] for name in sets}
+        made |= {half_name(name): moved for name, moved in found.halves.items()}
+        expressions = {name: {name: 1.0} for name, kind in sets.items() if kind == "vrm"}
+        notes = _notes(source, self.places.points(source.mesh.vertices), found, sets)
+        progress("writing the avatar", 0.9)
+        written = save_avatar(source, output, made, notes=notes, normals=normals, quantise=quantise,
+                              expressions=expressions)
+        return Rigged(written, tuple(made), (*self.warnings, *found.warnings), found,
+                      replace(source, shapes={**source.shapes, **made}, notes=notes))
+
+    def _shapes(self, only: Sequence[str] | None, choices: Choices, progress: Progress) -> Transferred:
+        for name in only or ():
+            if name not in self.names:
+                raise InputError(f"only: '{name}' is none of the shapes that were asked for"
+                                 f"{nearest(str(name), self.names)}")
+        if self._binding is None:
+            progress("making the shapes of the template", 0.0)
+            self._binding = Binding(self.source.mesh, self.places, self._asked.template(), pieces=self._pieces,
+                                    kept=kept_in("registrations") if self._cache else None,
+                                    progress=within(progress, 0.1, 0.4))
+            progress = within(progress, 0.4, 1.0)
+        return self._binding.shapes(choices, self.names if only is None else only, progress=progress)
+
+
 def rig(avatar: str | Path, output: str | Path, *, landmarks: str | Path | None = None,
         sets: Sequence[str] | None = None, shapes: Sequence[str] | None = None, person: str | Path | None = None,
         template: str | Path | None = None, template_landmarks: str | Path | None = None, method: str = "landmarks",
-        weights: WeightsLike | None = None, opening: float = 1.0, pieces: Mapping[str, str] | None = None,
-        normals: bool = True, quantise: bool = False, cache: bool = True, progress: Progress = silent) -> Rigged:
-    """Give an avatar blendshapes and write it.
+        weights: WeightsLike | None = None, opening: float = 1.0, lid_closure: float = 1.0,
+        pieces: Mapping[str, str] | None = None, normals: bool = True, quantise: bool = False, cache: bool = True,
+        progress: Progress = silent) -> Rigged:
+    """Give an avatar blendshapes and write it; `Rigging` does the same in steps.
 
     avatar: the path of a .obj, .glb, .gltf, .vrm, .ply or .stl file, or a shipped avatar's name. output: .glb (or
     .gltf, .vrm), .npz, or a folder for a sequence of OBJ files. landmarks: their file; a shipped avatar has its own.
     sets: vocabularies, see `shape_sets`; `DEFAULT_SETS` without. shapes: only those of these names. person: whose
     habits override expressions. template, template_landmarks: another face that has shapes, instead of facegen's own
-    and its sets, see `read_template`. method, opening, pieces: as in `transfer`; weights: as `read_weights`
-    takes them. normals, quantise: as in `save_avatar`. cache: use again how the skin was laid on the template, kept in
-    the user's cache folder, if avatar, landmarks, pieces and template are the same. progress: called with what is being
-    done and the share that is behind, 0 to 1, before the file appears; what it raises stops the work. Raises InputError
-    and its children. Nothing is written when anything is raised. ::
+    and its sets, see `read_template`. method, opening, lid_closure: see `Choices`; weights: as `read_weights` takes
+    them; pieces: part, material or number of a component -> kind. normals, quantise: as in `save_avatar`. cache: use
+    again how the skin was laid on the template, kept in the user's cache folder, if avatar, landmarks, pieces and
+    template are the same. progress: called with what is being done and the share that is behind, 0 to 1, before the
+    file appears; what it raises stops the work. Raises InputError and its children. Nothing is written when anything is
+    raised. ::
 
         facegen.rig("cat.obj", "cat.glb", landmarks="cat.yaml")
         facegen.load_face("cat.glb").pose("happiness")
     """
     progress("reading the avatar", 0.0)
-    path, marks = avatar_files(avatar, landmarks)
-    asked = _asked(sets, shapes, person, template, template_landmarks)
-    chosen = read_weights(weights)
-    source = load_avatar(path)
-    check_output(source, output, asked.sets)
-    places = load_landmarks(marks, source.mesh, mesh_name=path.name, digest=source.digest)
-    warnings = [*check_places(places, source.mesh), *_without_expressions(source, asked.sets)]
-    progress("making the shapes of the template", 0.05)
-    found = transfer(source.mesh, places, asked.template(), method=method, weights=chosen, opening=opening,
-                     pieces=pieces, kept=kept_in("registrations") if cache else None,
-                     progress=within(progress, 0.15, 0.9))
-    made = {name: found.shapes[name] for name in asked.sets}
-    made |= {half_name(name): moved for name, moved in found.halves.items() if name in made}
-    expressions = {name: {name: 1.0} for name, kind in asked.sets.items() if kind == "vrm"}
-    notes = _notes(source, places.points(source.mesh.vertices), found, asked.sets)
-    progress("writing the avatar", 0.9)
-    written = save_avatar(source, output, made, notes=notes, normals=normals, quantise=quantise,
-                          expressions=expressions)
-    return Rigged(written, tuple(made), (*warnings, *found.warnings), found,
-                  replace(source, shapes={**source.shapes, **made}, notes=notes))
+    rigging = Rigging(avatar, landmarks=landmarks, sets=sets, shapes=shapes, person=person, template=template,
+                      template_landmarks=template_landmarks, pieces=pieces, cache=cache)
+    return rigging.save(output, method=method, weights=weights, opening=opening, lid_closure=lid_closure,
+                        normals=normals, quantise=quantise, progress=within(progress, 0.05, 1.0))
 
 
 @dataclass(frozen=True)

@@ -42,6 +42,20 @@ _FINE_ENOUGH = 60_000
 
 
 @dataclass(frozen=True, eq=False)
+class Solver:
+    """``system``: factored. ``motion`` (k, n_s, 3): the template's, without its jaw. ``n``: of the avatar's vertices,
+    of which the system may have more."""
+
+    system: Transfer
+    motion: NDArray[np.float64]
+    n: int
+
+    def __call__(self, shapes: NDArray[np.int64], *, progress: Progress = silent) -> NDArray[np.float64]:
+        """Return the displacements (s, n, 3) of some shapes (s,), without the jaw, mm."""
+        return self.system.solve(self.motion[shapes], progress=progress)[:, :self.n]
+
+
+@dataclass(frozen=True, eq=False)
 class Skin:
     """``surface`` of n vertices, ``places`` of its landmarks (vertices (3,), weights (3,)), and ``registered`` (n, 3):
     the same vertices in the template's shape. All in the template's frame, mm."""
@@ -52,7 +66,6 @@ class Skin:
     sides: NDArray[np.float64]
     registered: NDArray[np.float64]
     correspondence: Correspondence
-    opening: float = 1.0
 
     @cached_property
     def landmarks(self) -> dict[str, NDArray]:
@@ -84,37 +97,43 @@ class Skin:
         return jaw_share(self.surface, self.feet, self.template.surface.faces, self.template.jaw_share, self.sides,
                          self.places)
 
-    @cached_property
-    def jaw(self) -> JawMotion | None:
-        """The avatar's jaw; None if the template knows of none."""
+    def jaw(self, opening: float = 1.0) -> JawMotion | None:
+        """Return the avatar's jaw; None if the template knows of none. opening: a factor on how far it turns."""
         if self.template.hinge is None:
             return None
         return avatar_jaw(self.template.hinge, self.template.landmarks, self.landmarks, self.registered,
-                          self.surface.vertices, self.jaw_share, opening=self.opening)
+                          self.surface.vertices, self.jaw_share, opening=opening)
 
     def motion(self, method: str = "landmarks", weights: Weights | PaperWeights | None = None, *,
                progress: Progress = silent) -> NDArray[np.float64]:
         """Return the displacements (k, n, 3) of the template's shapes on this skin, mm."""
+        if method == "landmarks" and not isinstance(weights, PaperWeights):
+            result = self.solver(weights or OURS)(np.arange(len(self.template.names)), progress=progress)
+            self.open_jaw(result, self.template.jaw)
+            return result
+        return self.published_motion(method, weights)
+
+    def published_motion(self, method: str, weights: PaperWeights | None = None) -> NDArray[np.float64]:
+        """Return the displacements (k, n, 3), mm, as published methods have them."""
         template = self.template
         if method == "cloning":
             return expression_cloning(self.surface, self.registered, template.surface, self.feet, template.motion)
-        if method == "sumner" or isinstance(weights, PaperWeights):
-            chosen = SUMNER if method == "sumner" else weights or PAPER
-            places, matrix = self._landmark_motion()
-            k = len(template.motion)
-            moved = (matrix @ template.motion.reshape(k, -1).T).T.reshape(k, -1, 3)
-            return gradient_transfer(self.surface, self.registered, template.surface, template.motion, weights=chosen,
-                                     landmarks=places, landmark_motion=moved, root=method == "sumner")
-        rest = self._without_jaw()
-        result = self._solver(weights or OURS, rest).solve(rest, progress=progress)[:, :len(self.surface.vertices)]
-        if self.jaw is not None:
-            for some in _blocks(len(result)):
-                turned = self.jaw.movement(self.surface.vertices, template.jaw[some])
-                result[some] += self.jaw_share[:, None] * turned
-        return result
+        chosen = SUMNER if method == "sumner" else weights or PAPER
+        places, matrix = self._landmark_motion()
+        k = len(template.motion)
+        moved = (matrix @ template.motion.reshape(k, -1).T).T.reshape(k, -1, 3)
+        return gradient_transfer(self.surface, self.registered, template.surface, template.motion, weights=chosen,
+                                 landmarks=places, landmark_motion=moved, root=method == "sumner")
 
-    def _without_jaw(self) -> NDArray[np.float64]:
-        """Return the template's displacements without what its jaw alone would do."""
+    def open_jaw(self, motion: NDArray, jaw: NDArray, opening: float = 1.0) -> None:
+        """Add to displacements (k, n, 3) what the template's jaw (k, 3) does, in place."""
+        own = self.jaw(opening)
+        for some in _blocks(len(motion) if own is not None else 0):
+            motion[some] += self.jaw_share[:, None] * own.movement(self.surface.vertices, jaw[some])
+
+    @cached_property
+    def without_jaw(self) -> NDArray[np.float64]:
+        """The template's displacements (k, n_s, 3) without what its jaw alone would do."""
         template = self.template
         if template.hinge is None:
             return template.motion
@@ -138,14 +157,13 @@ class Skin:
         return (placing(self.places, names, len(self.surface.vertices)),
                 landmark_matrix(self.template.places, names, matrices, len(self.template.surface.vertices)))
 
-    def _solver(self, weights: Weights, motion: NDArray) -> Transfer:
-        """Return the factored system, on a finer copy of the skin where a motion (k, n_s, 3) of the template bends more
-        than it can."""
+    def solver(self, weights: Weights = OURS) -> Solver:
+        """Return the factored system, on a finer copy of the skin where the template bends more than it can."""
         template, surface, registered = self.template, self.surface, self.registered
         sides, feet = self.sides, self.feet
         places, matrix = self._landmark_motion(blended=True)
         if len(surface.faces) < _FINE_ENOUGH:
-            fine, fine_registered, made_of = refine(surface, registered, partial(self._bend, motion))
+            fine, fine_registered, made_of = refine(surface, registered, partial(self._bend, self.without_jaw))
             if len(fine.vertices) > len(surface.vertices):
                 surface, registered, sides = fine, fine_registered, made_of @ sides
                 feet = self.correspondence(registered, vertex_normals(registered, surface.faces), sides, reach=_REACH)
@@ -154,7 +172,8 @@ class Skin:
         middles = self.correspondence(shape.corners.mean(axis=1), shape.normals, sides[surface.faces].mean(axis=1),
                                       reach=_REACH)
         matrices, turns = spread(self.parts, template.landmarks, registered)
-        return Transfer(surface, template.surface, feet, middles, matrices, turns, places, matrix, weights, sides)
+        system = Transfer(surface, template.surface, feet, middles, matrices, turns, places, matrix, weights, sides)
+        return Solver(system, self.without_jaw, len(self.surface.vertices))
 
     def _bend(self, motion: NDArray, places: NDArray, sides: NDArray) -> NDArray[np.float64]:
         """Return how far the motion of the middles of sides (e, 2) between places is from the mean of their ends', at
@@ -182,7 +201,7 @@ class Skin:
 
 
 def lay_skin(template: Template, surface: Surface, places: Mapping[str, tuple[NDArray, NDArray]], *,
-             opening: float = 1.0, kept: Kept | None = None, progress: Progress = silent) -> Skin:
+             kept: Kept | None = None, progress: Progress = silent) -> Skin:
     """Return the avatar's skin laid on the template.
 
     surface: the skin in the template's frame, mm. places: its landmarks. kept: where registrations are found again and
@@ -201,7 +220,7 @@ def lay_skin(template: Template, surface: Surface, places: Mapping[str, tuple[ND
                               correspondence, progress=progress)
         if key is not None:
             kept.keep(key, registered)
-    return Skin(template, surface, places, sides, registered, correspondence, opening)
+    return Skin(template, surface, places, sides, registered, correspondence)
 
 
 def _blocks(k: int):

@@ -7,8 +7,9 @@ pieces as what they are, and back.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,34 +17,32 @@ from numpy.typing import NDArray
 from facegen.errors import InputError, nearest
 from facegen.fileio.kept import Kept
 from facegen.geometry.mesh import Mesh
-from facegen.progress import Progress, silent, within
+from facegen.progress import Progress, counted, silent, within
 from facegen.transfer.alignment import Similarity, align
 from facegen.transfer.apart import take_apart
-from facegen.transfer.closing import closing
-from facegen.transfer.eyeball import EyeFront
-from facegen.transfer.halfway import halfway
-from facegen.transfer.keep_apart import Contact, keep_apart
+from facegen.transfer.baselines import PaperWeights
+from facegen.transfer.choices import OURS_CHOICES, Choices
 from facegen.transfer.landmarks import Landmarks
-from facegen.transfer.margins import LIDS, LIPS, Slit
-from facegen.transfer.piece_motion import PieceMotion, RigidMotions
 from facegen.transfer.pieces import Piece
-from facegen.transfer.sides import painted
-from facegen.transfer.skin import METHODS, Skin, lay_skin
+from facegen.transfer.pushing import Contact
+from facegen.transfer.skin import Skin, Solver, lay_skin
+from facegen.transfer.solve import OURS, Weights
 from facegen.transfer.template import Template
-from facegen.transfer.weights import AnyWeights
+from facegen.transfer.whole import Moved, WholeMotion, among_all
 
-# The jaw of an avatar opens between these shares of what is estimated; more is a mistake.
-_LEAST_OPENING, _MOST_OPENING = 0.1, 3.0
 # Because squares of larger numbers, and float32 in files, run over.
 _FARTHEST = 1e30
+# Shapes that are made together, to bound the memory.
+_AT_A_TIME = 16
 
 
 @dataclass(frozen=True, eq=False)
 class Transferred:
     """``shapes``: name -> displacement (n, 3) of the avatar's own vertices, in its own axes and units. ``frame``: from
     there to the template's. ``skin``, ``pieces``: what the avatar was taken for; ``contacts``: how far eyes and teeth
-    went through the skin before and after they were kept apart, mm. ``halves``: shape -> its corrective half way, see
-    `halfway`. ``warnings``: what was odd about the mesh."""
+    went through the skin before and after they were kept apart, mm, in each of the shapes. ``halves``: shape -> its
+    corrective half way, see `halfway`. ``warnings``: what was odd about the mesh. ``fresh``: the shapes that were
+    computed, not remembered."""
 
     shapes: Mapping[str, NDArray]
     frame: Similarity
@@ -52,90 +51,137 @@ class Transferred:
     contacts: Mapping[str, Contact]
     halves: Mapping[str, NDArray]
     warnings: tuple[str, ...] = ()
+    fresh: tuple[str, ...] = ()
 
 
-def transfer(mesh: Mesh, landmarks: Landmarks, template: Template, *, method: str = "landmarks",
-             weights: AnyWeights | None = None, opening: float = 1.0,
+def transfer(mesh: Mesh, landmarks: Landmarks, template: Template, *, choices: Choices = OURS_CHOICES,
              pieces: Mapping[str, str] | None = None, kept: Kept | None = None, progress: Progress = silent
              ) -> Transferred:
-    """Return the template's shapes on an avatar.
+    """Return the template's shapes on an avatar: a `Binding` that is used once.
 
-    mesh: the avatar, in any axes and units. landmarks: on it. method: "landmarks" (ours), or a published one to compare
-    with: "sumner", "cloning". weights: of the energies, see `read_weights`; ours without. opening: a factor on how
-    far the jaw opens. pieces: part, material or number of a component -> kind. kept: where registrations are kept
-    and found again. progress: called as `Progress` says. Raises InputError for what cannot be used: unknown names, a
-    mesh that cannot be solved.
+    choices: beside ours. progress: called as `Progress` says. Otherwise as there.
     """
-    if method not in METHODS:
-        raise InputError(f"method: expected {', '.join(METHODS)}, got {method!r}{nearest(str(method), METHODS)}")
-    if weights is not None and method != "landmarks":
-        raise InputError(f"weights: the method '{method}' has none to choose; leave them out, or the method")
-    if not _LEAST_OPENING <= opening <= _MOST_OPENING:
-        raise InputError(f"opening: expected a factor of {_LEAST_OPENING} to {_MOST_OPENING}, got {opening!r}")
-    far = np.flatnonzero((np.abs(mesh.vertices) > _FARTHEST).any(axis=1))
-    if len(far):
-        raise InputError(f"mesh: {len(far)} of {len(mesh.vertices)} vertices lie beyond {_FARTHEST:g} (first: "
-                         f"{', '.join(map(str, far[:5]))}); remove them or write the mesh in larger units")
-    frame = align(landmarks.points(mesh.vertices), template.landmarks)
-    progress("telling the pieces apart", 0.0)
-    parts = take_apart(mesh, landmarks, frame, explicit=pieces)
-    vertices, found, rows = parts.vertices, parts.pieces, parts.rows
-    skin = lay_skin(template, parts.surface, parts.places(template.places), opening=opening, kept=kept,
-                    progress=within(progress, 0.05, 0.3))
-    on_skin = skin.motion(method, weights, progress=within(progress, 0.3, 0.6))
-    contacts: Mapping[str, Contact] = {}
-    notes = parts.skin.notes
-    halves: Mapping[int, NDArray] = {}
-    if method != "landmarks":
-        motion = _among_all(on_skin, rows, len(vertices))
-    else:
-        progress("closing lids and lips", 0.6)
-        moved = PieceMotion(parts.solid, vertices, parts.skin.wound(parts.faces), parts.points)
-        fronts = {f"eye_{s}": EyeFront(ball, vertices[moved.rows(f"eye_{s}")]) for s, ball in moved.eyes.items()}
-        found_slits = {slit: closing(skin, slit, fronts.get(slit.name)) for slit in (*LIDS, LIPS)}
-        notes += tuple(_no_opening(slit) for slit, one in found_slits.items() if not one and _expected(slit, skin))
-        # A copy closes as the template does: there is nothing to mend.
-        slits = [] if skin.copied else [one for one in found_slits.values() if one]
-        for slit in slits:
-            slit.close(on_skin)
-        jaw = None if skin.jaw is None else RigidMotions.of(lambda at: skin.jaw.movement(at, template.jaw))
-        motion = moved.move(_among_all(on_skin, rows, len(vertices)), jaw, template.gaze, tongue=template.tongue)
-        # A tongue that comes out is before the lips, and is meant to be.
-        out = {} if template.tongue is None else {"tongue": np.where(template.tongue.comes_out() > 0, np.inf, 0.0)}
-        motion, contacts = keep_apart(moved, motion, template.gaze, allowed=out,
-                                      progress=within(progress, 0.7, 0.95))
-        if skin.copied:             # whatever pokes through it there
-            motion[:, rows] = on_skin
-        for slit in slits:
-            slit.seal(motion, rows)
-        progress("bending lids round the eyes", 0.95)
-        lids = [slit for slit in slits if slit.eye is not None]
-        still = ~(template.jaw.any(axis=1) | template.gaze.any(axis=1))
-        halves = halfway(moved, lids, rows, motion, still)
-    parts.skin.carry(motion)
-    parts.skin.carry(halves.values())
-    back, shapes = frame.inverse(), {}
-    for name, shape, other in zip(template.names, motion, template.minus, strict=True):
-        shapes[name] = back.apply_vectors(shape if other < 0 else shape - motion[other])[parts.own]
-    bent = {template.names[k]: back.apply_vectors(one)[parts.own] for k, one in halves.items()}
-    return Transferred(shapes, frame, skin, found, contacts, bent, notes)
+    binding = Binding(mesh, landmarks, template, pieces=pieces, kept=kept, progress=within(progress, 0.0, 0.3))
+    return binding.shapes(choices, progress=within(progress, 0.3, 1.0))
 
 
-def _expected(slit: Slit, skin: Skin) -> bool:
-    """Return whether landmarks say that there is a slit: of both faces, and not both edges on one place."""
-    names = {*slit.corners, slit.upper[len(slit.upper) // 2], slit.lower[len(slit.lower) // 2]}
-    return (names <= skin.places.keys() and names <= skin.template.places.keys()
-            and slit.side not in painted(skin.surface, skin.places, skin.sides))
+@dataclass
+class _Remembered:
+    """What was computed last: ``motion`` (k, n, 3) of all vertices, ``contacts`` and ``halves``, and for each shape
+    ``how``: the choices it depends on, None if it was not computed yet."""
+
+    motion: NDArray[np.float64]
+    how: list[Choices | None]
+    contacts: dict[str, Contact] = field(default_factory=dict)
+    halves: dict[int, NDArray] = field(default_factory=dict)
+
+    @classmethod
+    def of(cls, k: int, n: int) -> _Remembered:
+        """Return nothing, with room for k shapes of n vertices."""
+        return cls(np.zeros((k, n, 3)), [None] * k)
+
+    def put(self, shapes: NDArray[np.int64], moved: Moved, how: Sequence[Choices]) -> None:
+        """Remember some shapes (s,)."""
+        self.motion[shapes] = moved.motion
+        for name, contact in moved.contacts.items():
+            all_of = self.contacts.setdefault(name, Contact(*np.zeros((2, len(self.how)))))
+            all_of.before[shapes], all_of.after[shapes] = contact.before, contact.after
+        for k, own in zip(shapes.tolist(), how, strict=True):
+            self.how[k] = own
+            self.halves.pop(k, None)
+        self.halves.update(moved.halves)
 
 
-def _no_opening(slit: Slit) -> str:
-    what = "the lips" if slit is LIPS else f"the {'left' if slit.name.endswith('L') else 'right'} eye's lids"
-    return (f"no opening was found between {what} where the landmarks are: they close or part no more than the skin "
-            "round them moves")
+class Binding:
+    """An avatar laid on a template: what no choice changes is computed once, and shapes only where a choice changes
+    them. Not for two threads at a time."""
 
+    def __init__(self, mesh: Mesh, landmarks: Landmarks, template: Template, *,
+                 pieces: Mapping[str, str] | None = None, kept: Kept | None = None, progress: Progress = silent
+                 ) -> None:
+        """mesh: the avatar, in any axes and units. landmarks: on it. pieces: part, material or number of a component
+        -> kind. kept: where registrations are kept and found again. Raises InputError for what cannot be used: unknown
+        names, a mesh that cannot be solved."""
+        far = np.flatnonzero((np.abs(mesh.vertices) > _FARTHEST).any(axis=1))
+        if len(far):
+            raise InputError(f"mesh: {len(far)} of {len(mesh.vertices)} vertices lie beyond {_FARTHEST:g} (first: "
+                             f"{', '.join(map(str, far[:5]))}); remove them or write the mesh in larger units")
+        self.template = template
+        self.frame = align(landmarks.points(mesh.vertices), template.landmarks)
+        progress("telling the pieces apart", 0.0)
+        self._parts = parts = take_apart(mesh, landmarks, self.frame, explicit=pieces)
+        self.pieces = parts.pieces
+        self.skin = lay_skin(template, parts.surface, parts.places(template.places), kept=kept,
+                             progress=within(progress, 0.1, 1.0))
+        self._solver: tuple[Weights, Solver] | None = None
+        self._made: _Remembered | None = None
 
-def _among_all(on_skin: NDArray, rows: NDArray, n: int) -> NDArray[np.float64]:
-    """Return the displacements (k, n, 3) of all vertices, where those in ``rows`` are the skin's."""
-    motion = np.zeros((len(on_skin), n, 3))
-    motion[:, rows] = on_skin
-    return motion
+    @cached_property
+    def _whole(self) -> WholeMotion:
+        return WholeMotion(self.skin, self._parts)
+
+    def shapes(self, choices: Choices = OURS_CHOICES, only: Sequence[str] | None = None, *,
+               progress: Progress = silent) -> Transferred:
+        """Return the shapes, or those of some names. Raises InputError for a name that is none."""
+        template = self.template
+        for name in only or ():
+            if name not in template.names:
+                raise InputError(f"only: no shape is called '{name}'{nearest(str(name), template.names)}")
+        wanted = [k for k, name in enumerate(template.names) if only is None or name in only]
+        progress("finding lids, lips and eyes", 0.0)
+        how = self._choices_by_shape(choices)
+        made = self._made or _Remembered.of(len(template.names), len(self._parts.vertices))
+        self._made = made
+        needed = {*wanted, *(template.minus[k] for k in wanted if template.minus[k] >= 0)}
+        fresh = [k for k in sorted(needed) if made.how[k] != how[k]]
+        blocks = [np.array(fresh[start:start + _AT_A_TIME]) for start in range(0, len(fresh), _AT_A_TIME)]
+        if blocks:
+            progress("solving for the skin's motion", 0.1)
+            skin_motion = self._skin_motion(choices)
+            for block in counted(within(progress, 0.2, 1.0), "carrying the shapes over", blocks):
+                made.put(block, self._moved(block, skin_motion(block), choices), [how[k] for k in block])
+        back, own = self.frame.inverse(), self._parts.own
+
+        def returned(motion: NDArray) -> NDArray[np.float64]:
+            return back.apply_vectors(motion)[own]
+
+        found = {template.names[k]: returned(made.motion[k] if template.minus[k] < 0 else
+                                             made.motion[k] - made.motion[template.minus[k]]) for k in wanted}
+        halves = {template.names[k]: returned(made.halves[k]) for k in wanted if k in made.halves}
+        ours = choices.method == "landmarks"
+        contacts = {name: Contact(one.before[wanted], one.after[wanted]) for name, one in made.contacts.items() if ours}
+        notes = self._whole.notes if ours else ()
+        return Transferred(found, self.frame, self.skin, self.pieces, contacts, halves,
+                           (*self._parts.skin.notes, *notes), tuple(template.names[k] for k in fresh))
+
+    def _choices_by_shape(self, choices: Choices) -> list[Choices]:
+        """Return the choices that each shape depends on."""
+        if choices.method != "landmarks":
+            return [choices] * len(self.template.names)
+        both = zip(self._whole.jaw_moves, self._whole.lids_close, strict=True)
+        return [replace(choices, opening=choices.opening if jaw else 1.0,
+                        lid_closure=choices.lid_closure if lid else 1.0) for jaw, lid in both]
+
+    def _skin_motion(self, choices: Choices) -> Callable[[NDArray], NDArray]:
+        """Return what gives the skin's displacements (s, n, 3) in some shapes (s,)."""
+        weights = choices.weights or OURS
+        if choices.method != "landmarks" or isinstance(weights, PaperWeights):
+            return self.skin.published_motion(choices.method, choices.weights).__getitem__
+        if self._solver is None or self._solver[0] != weights:
+            self._solver = None                     # two are never needed
+            self._solver = weights, self.skin.solver(weights)
+        solver = self._solver[1]
+
+        def motion(shapes: NDArray[np.int64]) -> NDArray[np.float64]:
+            result = solver(shapes)
+            self.skin.open_jaw(result, self.template.jaw[shapes], choices.opening)
+            return result
+
+        return motion
+
+    def _moved(self, shapes: NDArray[np.int64], on_skin: NDArray, choices: Choices) -> Moved:
+        if choices.method == "landmarks":
+            return self._whole(shapes, on_skin, opening=choices.opening, lid_closure=choices.lid_closure)
+        motion = among_all(on_skin, self._parts.rows, len(self._parts.vertices))
+        self._parts.skin.carry(motion)
+        return Moved(motion, {}, {})

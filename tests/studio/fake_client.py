@@ -50,12 +50,24 @@ class Maker:
 
     def __init__(self) -> None:
         self.made: list[Handle] = []
+        self.clicks: list[Any] = []
         self.main_panel = SimpleNamespace(dock_right=lambda: None)
 
     def __getattr__(self, name: str) -> Any:
         if name.startswith("add_"):
             return lambda *values, **named: self._add(name[4:], values, named)
         return lambda *_, **__: None
+
+    def on_click(self, **_):
+        return self.clicks.append
+
+    def remove_click_callback(self, call):
+        self.clicks.remove(call)
+
+    def click(self, origin, direction):
+        """Do as a person who clicks into the picture, where a ray of the scene begins."""
+        for call in tuple(self.clicks):
+            call(SimpleNamespace(client=self, ray_origin=tuple(origin), ray_direction=tuple(direction)))
 
     def _add(self, kind: str, values: tuple, named: dict) -> Handle:
         named = dict(named)
@@ -75,7 +87,7 @@ class Maker:
 
     def find(self, label: str) -> Handle:
         """Return the one handle of a label that is not removed."""
-        found, = (one for one in self.made if getattr(one, "label", None) == label and not one.removed)
+        found, = (one for one in self.made if str(getattr(one, "label", None)) == label and not one.removed)
         return found
 
 
@@ -86,6 +98,10 @@ class FakeClient:
         self.scene, self.gui = Maker(), Maker()
         self.camera = SimpleNamespace()
         self.notices: list[tuple[str, str]] = []
+        self.downloads: dict[str, bytes] = {}
+
+    def send_file_download(self, name, content, **_):
+        self.downloads[name] = content
 
     def add_notification(self, title, body, **named):
         self.notices.append((title, body))

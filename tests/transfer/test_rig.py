@@ -106,6 +106,7 @@ def test_a_template_transferred_to_itself_gives_its_skin(template):
     ({"sets": []}, "expected one or more of units"),
     ({"method": "sumners"}, "did you mean 'sumner'"),
     ({"opening": 0.0}, "opening: expected a factor"),
+    ({"lid_closure": 3.0}, "lid_closure: expected a factor"),
     ({"pieces": {"hat": "skull"}}, "hat"),
     ({"avatar": "nope.obj"}, r"avatar: expected a file, got 'nope\.obj', which does not exist"),
     ({"avatar": "catt"}, r"expected a file, or one of cartoon, cat.* did you mean 'cat'"),
@@ -130,6 +131,7 @@ def test_the_command(tmp_path, capsys):
     assert "18 shapes" in capsys.readouterr().out or out.exists()
     assert main(["render", "happiness", "--face", str(out), "-o", str(tmp_path / "c.png"), "--size", "64"]) == 0
     assert main(["rig", "cartoon"]) == 2
+    assert main(["rig", "cartoon", "-o", str(out), "--lid-closure", "-1"]) == 2
     assert main(["rig", "cartoon", "-o", str(out), "--piece", "cap"]) == 2
     assert "PART=KIND" in capsys.readouterr().err
 

@@ -1,0 +1,64 @@
+"""The studio put together: the server, what its pages share, and a `Page` for each that comes."""
+
+from __future__ import annotations
+
+import os
+import threading
+from collections.abc import Callable
+from typing import Any
+
+from facegen.studio.desk import Desk
+from facegen.studio.page import Page, Panel
+from facegen.studio.server import StudioServer
+from facegen.studio.stage import set_scene
+
+
+class Studio:
+    """A running studio. ``server``; ``desk``; ``pages``: those open, by viser's number of the client.
+
+    folder: where works are kept. panels: title of the tab -> what makes it; the usual ones by default. The rest is for
+    the `StudioServer`. A context manager.
+    """
+
+    def __init__(self, folder: str | os.PathLike[str], *, panels: dict[str, Callable[[Page], Panel]] | None = None,
+                 **options: Any) -> None:
+        if panels is None:
+            from facegen.studio.panels import PANELS as panels
+        self.desk = Desk(folder)
+        self.pages: dict[int, Page] = {}
+        self._panels, self._lock = panels, threading.Lock()
+        self.server = StudioServer(on_page=self._came, on_page_closed=self._went, **options)
+
+    def start(self) -> Studio:
+        """Listen, and return the studio itself. Raises as `StudioServer.start` does."""
+        self.server.start()
+        set_scene(self.server.viser)
+        return self
+
+    def _came(self, client: Any, work: str) -> None:
+        page = Page(client, work, self.desk, self._panels)
+        with self._lock:
+            self.pages[client.client_id] = page
+        if client.client_id not in self.server.viser.get_clients():     # it went while it was made
+            self._went(client, work)
+
+    def _went(self, client: Any, work: str) -> None:
+        with self._lock:
+            page = self.pages.pop(client.client_id, None)
+        if page is not None:
+            page.close()
+
+    def stop(self) -> None:
+        """Close all pages, save, and listen no more."""
+        self.server.stop()
+        with self._lock:
+            pages, self.pages = list(self.pages.values()), {}
+        for page in pages:
+            page.close()
+        self.desk.store.flush()
+
+    def __enter__(self) -> Studio:
+        return self.start()
+
+    def __exit__(self, *_: object) -> None:
+        self.stop()

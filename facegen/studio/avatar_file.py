@@ -1,0 +1,128 @@
+"""Avatars that a person opened: kept in the folder of the work, read with limits, and the shipped ones by name."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+
+import numpy as np
+
+from facegen.errors import FileError, InputError
+from facegen.fileio.avatar import AvatarFile, load_avatar
+from facegen.fileio.textfile import make_folder, whole_file
+from facegen.studio.limits import MEBIBYTE, Limits
+from facegen.transfer.rig import avatar_files, avatar_names
+
+FOLDER = "avatar"
+"""Folder of a work that holds what was opened there."""
+
+TAKEN = (".obj", ".glb", ".vrm", ".ply", ".stl", ".gltf")
+
+LIMITS = Limits()
+"""What is taken at most. An avatar for games has a tenth of the triangles."""
+
+_UNSAFE = re.compile(r"[^\w.-]+")
+_LONGEST = 60
+_KEPT = 4               # avatars in memory: those of a few steps of undo
+
+
+@dataclass(frozen=True, eq=False)
+class Opened:
+    """``name`` as the work has it, ``path``, ``avatar`` as its file has it."""
+
+    name: str
+    path: Path
+    avatar: AvatarFile
+
+    @property
+    def summary(self) -> str:
+        """What it is, in a line."""
+        mesh = self.avatar.mesh
+        parts = "1 part" if len(mesh.parts) == 1 else f"{len(mesh.parts)} parts"
+        own = f", {len(self.avatar.shapes)} blendshapes of its own" if self.avatar.shapes else ""
+        return f"**{self.name}**: {len(mesh.faces):,} triangles, {parts}{own}"
+
+    @property
+    def output(self) -> str:
+        """The name of the file that it gets with blendshapes: a VRM stays one."""
+        return f"{Path(self.name).stem}{'.vrm' if self.path.suffix.lower() == '.vrm' else '.glb'}"
+
+
+def safe_name(name: str) -> str:
+    """Return a file's name without what could lead out of a folder; InputError for a kind that is not taken."""
+    base = str(name).replace("\\", "/").rsplit("/", 1)[-1]
+    stem, dot, suffix = base.rpartition(".")
+    suffix = f"{dot}{suffix}".lower()
+    if suffix not in TAKEN:
+        raise InputError(f"file: expected an avatar that ends in {', '.join(TAKEN)}, got '{base[:_LONGEST]}'")
+    stem = _UNSAFE.sub("_", stem).strip("._") or "avatar"
+    return stem[:_LONGEST] + suffix
+
+
+def keep(folder: Path, name: str, content: bytes) -> str:
+    """Keep a file that came from a browser in a work's folder and return its name there; InputError if it is too much.
+
+    It is read before it is kept: what cannot be opened leaves what was there as it was.
+    """
+    name = safe_name(name)
+    if len(content) > LIMITS.file_bytes:
+        raise InputError(f"file: '{name}' has {len(content) / MEBIBYTE:.0f} MB, the studio takes up to "
+                         f"{LIMITS.file_bytes / MEBIBYTE:.0f}; leave out pictures and clothes, or use the command "
+                         "facegen rig")
+    place = make_folder(folder / FOLDER)
+    with whole_file(place / name, "the avatar ") as draft:
+        trial = draft.with_suffix(Path(name).suffix)            # readers go by it
+        try:
+            trial.write_bytes(content)
+            with called(trial, name):
+                _check(load_avatar(trial), name)
+            trial.replace(draft)
+        finally:
+            trial.unlink(missing_ok=True)
+    return name
+
+
+@contextmanager
+def called(path: Path, name: str) -> Iterator[None]:
+    """Have errors say a file's own name instead of where it is kept."""
+    try:
+        yield
+    except InputError as error:
+        raise InputError(str(error).replace(str(path), name)) from None
+
+
+def open_avatar(folder: Path, name: str) -> Opened:
+    """Return an avatar that was kept in a work's folder, or a shipped one by name; InputError or FileError."""
+    if name in avatar_names():
+        path = avatar_files(name, None)[0]
+    else:
+        path = folder / FOLDER / safe_name(name)
+        if not path.is_file():
+            raise FileError(f"avatar: '{name}' is no longer in the folder of this work; open it again")
+    return Opened(name, path, _read(path, path.stat().st_mtime_ns))
+
+
+@lru_cache(maxsize=_KEPT)
+def _read(path: Path, changed: int) -> AvatarFile:
+    avatar = load_avatar(path)
+    _check(avatar, path.name)
+    return avatar
+
+
+def _check(avatar: AvatarFile, name: str) -> None:
+    mesh = avatar.mesh
+    if not len(mesh.faces):
+        raise InputError(f"'{name}' has no triangles: there is nothing to put a face on")
+    if len(mesh.faces) > LIMITS.triangles:
+        raise InputError(f"'{name}' has {len(mesh.faces):,} triangles, the studio takes up to {LIMITS.triangles:,}; "
+                         "make fewer of them first (in Blender: the Decimate modifier), or use the command facegen rig")
+    used = mesh.vertices[np.unique(mesh.faces)]
+    bad = int((~np.isfinite(used).all(axis=1)).sum())
+    if bad:
+        raise InputError(f"'{name}': {bad} of {len(used)} vertices are NaN or infinite; export it again")
+    if not np.ptp(used, axis=0).max() > 0:
+        raise InputError(f"'{name}': all vertices lie on one place; export it again")

@@ -1,0 +1,30 @@
+"""What one studio takes: how many pages, how large, how fast."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+MEBIBYTE = 1 << 20
+
+
+@dataclass(frozen=True)
+class Limits:
+    """The bounds of one server; every one of them is refused or slowed with a line that says so.
+
+    pages: pages open at once. works: different works seen by one server. message_bytes: one message of a page; an
+    upload comes in parts of half a mebibyte. file_bytes: one uploaded file. uploads, upload_bytes: uploads of one page
+    under way. messages: messages a second of one page, more are slowed. text: characters of one text of a page.
+    triangles: of an opened avatar. read_seconds, read_bytes: what reading a file may take.
+    """
+
+    pages: int = 16
+    works: int = 256
+    message_bytes: int = 4 * MEBIBYTE
+    file_bytes: int = 64 * MEBIBYTE
+    upload_bytes: int = 128 * MEBIBYTE
+    uploads: int = 4
+    messages: float = 240.0
+    text: int = 200_000
+    triangles: int = 400_000
+    read_seconds: float = 60.0
+    read_bytes: int = 2048 * MEBIBYTE

@@ -1,0 +1,83 @@
+"""Files that a browser sends: kept where they belong, refused in words."""
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from facegen.errors import FileError, InputError
+from facegen.studio import avatar_file
+from facegen.studio.avatar_file import FOLDER, TAKEN, keep, open_avatar, safe_name
+from facegen.studio.limits import Limits
+from facegen.transfer.rig import avatar_files, avatar_names
+
+TRIANGLE = b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"
+
+
+@given(st.text(max_size=80), st.sampled_from(TAKEN))
+@settings(deadline=None, max_examples=40)
+def test_no_name_leads_out_of_the_folder(name, suffix):
+    safe = safe_name(name + suffix)
+    assert safe.endswith(suffix)
+    assert not set(safe) & set("/\\:\0 ")
+    assert not safe.startswith(".")
+    assert len(safe) < 80
+    assert safe_name(safe) == safe
+
+
+@pytest.mark.parametrize("name", ["cat.exe", "cat", "", "..", ".glb.yaml", "cat.glb/"])
+def test_other_files_are_refused(name):
+    with pytest.raises(InputError, match="expected an avatar that ends in"):
+        safe_name(name)
+
+
+def test_what_is_kept_is_found_again(tmp_path):
+    assert keep(tmp_path, "../../My cat.OBJ", TRIANGLE) == "My_cat.obj"
+    assert sorted(path.name for path in (tmp_path / FOLDER).iterdir()) == ["My_cat.obj"]
+    found = open_avatar(tmp_path, "My_cat.obj")
+    assert len(found.avatar.mesh.faces) == 1
+    assert "1 triangles, 1 part" in found.summary
+    assert found.output == "My_cat.glb"
+    assert open_avatar(tmp_path, "My_cat.obj").avatar is found.avatar
+    assert keep(tmp_path, "My cat.obj", TRIANGLE + b"v 0 0 1\nf 1 2 4\n") == "My_cat.obj"
+    assert len(open_avatar(tmp_path, "My_cat.obj").avatar.mesh.faces) == 2
+
+
+@pytest.mark.parametrize("name", avatar_names())
+def test_shipped_avatars_are_opened_by_name(name, tmp_path):
+    assert open_avatar(tmp_path, name).path == avatar_files(name, None)[0]
+
+
+@pytest.mark.parametrize(("name", "content", "said"), [
+    ("a.obj", b"v 0 0 0\n", "triangle|face"),
+    ("a.obj", b"v 0 0 0\nv nan 0 0\nv 0 1 0\nf 1 2 3\n", "NaN|finite|number"),
+    ("a.obj", b"v 1 1 1\nv 1 1 1\nv 1 1 1\nf 1 2 3\n", "one place"),
+    ("a.obj", b"v 0 0 0\nf 1 2 9\n", "9"),
+    ("a.glb", b"", "glb"),
+    ("a.glb", b"glTF" + bytes(20), "glb"),
+    ("a.glb", b"\x00" * 5000, "glb"),
+    ("a.vrm", TRIANGLE, "vrm"),
+    ("a.ply", b"ply\nformat ascii 1.0\nelement vertex 999999999\n", "ply"),
+    ("a.stl", b"solid", "stl"),
+    ("a.gltf", b'{"asset": {"version": "2.0"}, "buffers": [{"uri": "../../etc/passwd", "byteLength": 9}]}', "gltf"),
+])
+def test_hostile_files_are_refused_and_leave_nothing(tmp_path, name, content, said):
+    keep(tmp_path, "good.obj", TRIANGLE)
+    with pytest.raises(InputError, match=said) as refused:
+        keep(tmp_path, name, content)
+    assert ".part" not in str(refused.value)
+    assert str(tmp_path) not in str(refused.value), "where works are kept is nobody's business"
+    assert sorted(path.name for path in (tmp_path / FOLDER).iterdir()) == ["good.obj"]
+
+
+def test_what_is_too_much_is_refused(tmp_path, monkeypatch):
+    monkeypatch.setattr(avatar_file, "LIMITS", Limits(file_bytes=100, triangles=1))
+    with pytest.raises(InputError, match="MB, the studio takes up to"):
+        keep(tmp_path, "a.obj", TRIANGLE + b"#" * 100)
+    with pytest.raises(InputError, match="2 triangles, the studio takes up to 1"):
+        keep(tmp_path, "a.obj", TRIANGLE + b"v 0 0 1\nf 1 2 4\n")
+    assert not list((tmp_path / FOLDER).iterdir())
+
+
+def test_a_file_that_went_away_is_said(tmp_path):
+    with pytest.raises(FileError, match="open it again"):
+        open_avatar(tmp_path, "cat.glb")

@@ -1,0 +1,235 @@
+"""The Avatar tab with a client that is no browser: clicks are rays, and what they make is in the work."""
+
+import numpy as np
+import pytest
+from fake_client import FakeClient
+
+from facegen.face.landmarks import REQUIRED
+from facegen.studio.avatar_panel import AvatarPanel
+from facegen.studio.avatar_scene import AVATAR
+from facegen.studio.desk import Desk
+from facegen.studio.landmark_words import ORDER, WORDS
+from facegen.studio.page import Page
+from facegen.studio.picking import as_places, point
+from facegen.transfer.landmarks import load_landmarks
+from facegen.transfer.rig import avatar_files
+
+NAME = "work-of-one"
+
+
+class Opened:
+    """A page with an Avatar tab on which a shipped avatar was opened."""
+
+    def __init__(self, folder, avatar="cat"):
+        self.page = Page(FakeClient(), NAME, Desk(folder), {"Avatar": AvatarPanel})
+        self.client, self.gui = self.page.client, self.page.client.gui
+        self.panel, = self.page._panels
+        if avatar:
+            self.gui.find("Or try one").enter(avatar)
+            self.marks = load_landmarks(avatar_files(avatar, None)[1], self.mesh)
+            self.true = self.marks.points(self.mesh.vertices)
+
+    @property
+    def mesh(self):
+        return self.panel.scene.mesh
+
+    @property
+    def work(self):
+        return self.page.work.avatar
+
+    def ray(self, name, shift=(0.0, 0.0, 0.0)):
+        """Where a ray from before the face starts that meets a landmark's true place, moved by mm."""
+        figure = self.panel.scene.figure
+        at = self.panel.scene.placement.apply(self.true[name]) + shift
+        return figure.place(at + np.array([0.0, 0.0, 500.0])), (0.0, 0.0, -1.0)
+
+    def click(self, name, shift=(0.0, 0.0, 0.0)):
+        self.client.scene.click(*self.ray(name, shift))
+
+    def off(self, name, other=None):
+        """How far a point is from its true place, or another's, seen from before, mm."""
+        placement = self.panel.scene.placement
+        away = placement.apply(point(self.mesh, self.work.landmarks[name])) - placement.apply(self.true[other or name])
+        return float(np.linalg.norm(away[:2]))
+
+    def place_all(self):
+        """Have all true landmarks placed."""
+        from dataclasses import replace
+        self.page.change("all", avatar=replace(self.work, landmarks=as_places(self.marks)))
+
+
+@pytest.fixture
+def opened(tmp_path):
+    made = Opened(tmp_path)
+    yield made
+    assert made.panel.picker.settle()
+    assert made.panel.rigging.settle()
+    made.page.close()
+
+
+def test_points_are_placed_by_clicks_one_after_another(opened):
+    opened.page.undo()
+    assert (opened.work.file, AVATAR in opened.page.stage.figures) == (None, False)
+    opened.page.redo()
+    assert opened.panel.scene.figure is opened.page.stage.figures[AVATAR]
+    for count in range(4):
+        name = opened.panel.picker.wanted(opened.work)
+        assert WORDS[name].label in next(one.content for one in opened.gui.made if "needed" in str(
+            getattr(one, "content", "")))
+        opened.click(name)
+        assert opened.panel.picker.settle()
+        assert len(opened.work.landmarks) == count + 1
+        assert opened.off(name) < 0.5
+    opened.page.undo()
+    assert len(opened.work.landmarks) == 3
+    assert opened.client.notices == []
+
+
+def test_a_click_beside_the_avatar_places_nothing_and_none_is_heard_when_nobody_picks(opened):
+    opened.client.scene.click((50.0, 0.0, 9.0), (0.0, 0.0, -1.0))
+    assert opened.work.landmarks == {}
+    assert len(opened.client.scene.clicks) == 1
+    opened.gui.find("Place points by clicking").enter(False)
+    assert opened.client.scene.clicks == []
+    opened.gui.find("Place points by clicking").enter(True)
+    opened.click(ORDER[0])
+    assert len(opened.work.landmarks) == 1
+
+
+def test_a_ball_that_is_clicked_on_is_chosen_and_moved_by_the_next_click(opened):
+    opened.click(ORDER[0])
+    opened.click(ORDER[0])
+    assert set(opened.work.landmarks) == {ORDER[0]}, "the second click chose the ball"
+    assert opened.panel.picker.chosen == ORDER[0]
+    opened.click("nose_tip")
+    assert opened.off(ORDER[0], "nose_tip") < 0.5
+    assert opened.panel.picker.chosen is None
+
+
+def test_what_is_dragged_goes_over_the_surface_and_takes_its_partner_along(opened):
+    opened.place_all()
+    opened.client.camera.position = tuple(opened.ray("eye_outer_L")[0])
+    ball = next(one for one in opened.client.scene.made if one.label == "/landmarks/eye_outer_L" and not one.removed)
+    before = opened.work.landmarks
+    for phase, shift in (("start", 0.0), ("update", 2.0), ("end", 4.0)):
+        true = opened.panel.scene.placement.apply(opened.true["eye_outer_L"])
+        at = opened.panel.scene.figure.place(true + np.array([shift, 0.0, 0.0]))
+        ball.press(phase=phase, end_position=tuple(at))
+        assert (opened.work.landmarks == before) == (phase != "end")
+    assert opened.off("eye_outer_L") == pytest.approx(4.0, abs=1.5)
+    assert opened.off("eye_outer_R") == pytest.approx(opened.off("eye_outer_L"), abs=0.7)
+    opened.page.undo()
+    assert opened.work.landmarks == before
+    opened.gui.find("Move both sides together").enter(False)
+    ball.press(phase="end", end_position=tuple(at))
+    assert opened.off("eye_outer_L") > 2.0
+    assert opened.off("eye_outer_R") < 0.1
+
+
+def test_optional_points_can_be_skipped_and_any_point_be_placed_anew(opened):
+    opened.place_all()
+    label = WORDS["eye_outer_L"].label
+    opened.gui.find("Point").enter(label)
+    opened.gui.find("Remove this point").press()
+    assert set(opened.true) - set(opened.work.landmarks) == {"eye_outer_L"}
+    assert opened.gui.find("Make blendshapes").disabled
+    opened.click("eye_outer_L")
+    assert opened.off("eye_outer_L") < 0.5
+    for name in ("jaw_L", "jaw_R"):
+        opened.gui.find("Point").enter(WORDS[name].label)
+        opened.gui.find("Remove this point").press()
+    opened.gui.find("Point").enter("the next one")
+    assert opened.panel.picker.wanted(opened.work) == "jaw_L"
+    opened.gui.find("Skip this point").press()
+    assert opened.work.skipped == {"jaw_L": True}
+    opened.gui.find("Skip the optional points").press()
+    assert opened.panel.picker.wanted(opened.work) is None
+    assert not opened.gui.find("Make blendshapes").disabled
+
+
+def test_points_that_are_wrong_are_said_in_words(opened):
+    opened.place_all()
+    swapped = {**opened.work.landmarks, "eye_inner_L": opened.work.landmarks["eye_outer_L"],
+               "eye_outer_L": opened.work.landmarks["eye_inner_L"]}
+    from dataclasses import replace
+    opened.page.change("swap", avatar=replace(opened.work, landmarks=swapped))
+    assert opened.panel.picker.settle()
+    said = opened.panel.picker._faults
+    assert said.visible
+    assert "**Inner corner, left eye** and **Outer corner, left eye** are swapped" in said.content
+    opened.page.undo()
+    assert opened.panel.picker.settle()
+    assert "swapped" not in said.content
+
+
+def test_landmarks_go_to_a_file_and_come_back(opened):
+    opened.place_all()
+    kept = opened.work.landmarks
+    opened.gui.find("Save landmarks").press()
+    (name, content), = opened.client.downloads.items()
+    assert name == "cat.yaml"
+    opened.gui.find("Remove all points").press()
+    assert opened.work.landmarks == {}
+    load = opened.gui.find("Load landmarks")
+    load.enter(Upload("mine.yaml", content))
+    assert set(opened.work.landmarks) == set(kept)
+    for one in REQUIRED:
+        assert opened.off(one) < 1e-4
+    opened.client.notices.clear()
+    opened.gui.find("Or try one").enter("human")
+    load.enter(Upload("mine.yaml", content))
+    (_, said), = opened.client.notices
+    assert "the landmarks are of a mesh with the hash" in said
+    assert opened.work.landmarks == {}
+    for hostile in (b"", b"\xff\xfe", b"landmarks: [", b"a: &a [*a]", b"landmarks: {chin: 99999999}"):
+        opened.client.notices.clear()
+        load.enter(Upload("x.yaml", hostile))
+        assert len(opened.client.notices) == 1, hostile
+        assert opened.client.notices[0][0] == "That cannot be", hostile
+        assert "/" not in opened.client.notices[0][1].split(":")[0], "the file is called as its owner calls it"
+    assert opened.work.landmarks == {}
+
+
+def test_an_upload_is_kept_with_the_work_and_found_after_a_reload(tmp_path):
+    first = Opened(tmp_path, avatar=None)
+    content = avatar_files("cat", None)[0].read_bytes()
+    first.gui.find("Open an avatar").enter(Upload("../my cat.obj", content))
+    assert wait(lambda: first.work.file)
+    assert first.work.file == "my_cat.obj"
+    first.gui.find("Open an avatar").enter(Upload("bad.glb", b"glTF"))
+    assert wait(lambda: first.client.notices)
+    assert first.client.notices[0][0] == "That cannot be"
+    assert first.work.file == "my_cat.obj"
+    first.page.close()
+    again = Opened(tmp_path, avatar=None)
+    assert again.work.file == "my_cat.obj"
+    assert again.panel.scene.figure is not None
+    assert len(again.mesh.faces) == len(first.mesh.faces)
+    again.page.close()
+
+
+def test_an_avatar_that_lies_down_is_stood_up(opened):
+    low, high = opened.panel.scene.figure.vertices.min(axis=0), opened.panel.scene.figure.vertices.max(axis=0)
+    opened.gui.find("It looks to").enter("-z")
+    turned = opened.panel.scene.figure.vertices
+    assert turned[:, 0].max() == pytest.approx(-low[0], abs=1e-6)
+    assert turned[:, 1].max() == pytest.approx(high[1], abs=1e-6)
+    opened.gui.find("It looks to").enter("+y")
+    assert "at right angles" in opened.client.notices[-1][1]
+    assert opened.gui.find("It looks to").value == "-z", "what is shown is what is"
+
+
+class Upload:
+    """What viser gives of a file."""
+
+    def __init__(self, name, content):
+        self.name, self.content = name, content
+
+
+def wait(true, seconds=20.0):
+    """Return whether something becomes true in time."""
+    import time
+    end = time.monotonic() + seconds
+    while not true() and time.monotonic() < end:
+        time.sleep(0.02)
+    return true()
