@@ -26,7 +26,8 @@ def test_other_readers_of_yaml_agree(data):
 
 
 def test_it_is_to_be_read_by_people():
-    data = {"about": "x", "units": {"12": {"points": {f"point_{k}": [0.1, 0.2, 0.3] for k in range(5)}}, "4": {"scale": 2}}}
+    points = {f"point_{k}": [0.1, 0.2, 0.3] for k in range(5)}
+    data = {"about": "x", "units": {"12": {"points": points}, "4": {"scale": 2}}}
     assert yaml_text(data) == """about: "x"
 units:
   "12":
