@@ -31,6 +31,7 @@ _SIZE, _FEWER, _CHOSEN_SIZE = 1.0, 1.8, 1.5     # mm: of a point on a face of ma
 _MANY = 40
 _TINTED = 0.45          # opacity
 _PROUD = 0.25           # mm that tints and borders stand before the skin, so that they are not lost in it
+_BESIDE = np.array([2.0, 2.0, 3.0])
 _AXIS = 85.0            # mm of the jaw's axis to either side
 _RIGID = 0.999          # a point that makes so much of the head's turn turns with the skull
 
@@ -197,7 +198,7 @@ class PointsOverlay:
                 handle.position = self.figure.place(at @ turn.T + shift)
 
     def _beside(self, place: Array) -> Array:
-        return self.figure.place(place + [2.0, 2.0, 3.0])
+        return self.figure.place(place + _BESIDE)
 
     def _skull(self) -> tuple[list[int], Array]:
         """Return the points that nothing moves but the head's turn, and their places at rest."""
