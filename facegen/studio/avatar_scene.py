@@ -116,8 +116,8 @@ class AvatarScene:
         if len(known) >= 3:
             low, high = known.min(axis=0), known.max(axis=0)
             middle = (low + high) / 2
-            # A part is at least half of what it is on the base face: few points do not say how large it is.
-            reach = max(0.62 * float(np.linalg.norm((high - low)[:2])), 0.5 * reach)
+            # A part is hardly smaller than the base face's: few points do not say how large it is.
+            reach = max(0.62 * float(np.linalg.norm((high - low)[:2])), 0.85 * reach)
         yaw, pitch = (0.0, 0.0) if name is None else view_of(name)
         self.page.stage.look(BESIDE + middle, yaw=yaw, pitch=pitch, distance=_ROOM * reach / _HALF_ANGLE)
         return reach
