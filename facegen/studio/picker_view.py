@@ -42,6 +42,7 @@ class PickerView:
         self._reach = room_of("whole")[1]
         self._listens = False
         self._stamp: Any = None                 # what is shown
+        self._question: Any = None              # what is asked for, and of which work
         self.markers = Markers(
             page.client.scene, lambda name: page.calls(lambda event: self._dragged(name, event)))
         self._thinking = Latest("proposals", page.fault)
@@ -109,7 +110,11 @@ class PickerView:
 
     def wanted(self, work: AvatarWork) -> str | None:
         """Return the point that is asked for."""
-        return picking.wanted(work, chosen=self.chosen, advised=self.proposals.advised)
+        # Advice that comes later does not change the question that a person is about to answer.
+        of = (work.file, work.landmarks, work.skipped, self.chosen)
+        if self._question is None or self._question[0] != of:
+            self._question = of, picking.wanted(work, chosen=self.chosen, advised=self.proposals.advised)
+        return self._question[1]
 
     def refresh(self, work: Work) -> None:
         """Show a work."""
