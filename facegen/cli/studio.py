@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 Host = Annotated[str, typer.Option(
     "--host", metavar="ADDRESS", help="Where it listens; for any address but this machine's own a token is asked for.")]
 Port = Annotated[int | None, typer.Option(
-    "--port", min=1, max=65535, metavar="N", help="[default: 8092, or the next that is free]")]
+    "--port", metavar="N", help="0 takes any that is free. [default: 8092, or the next that is free]")]
 Token = Annotated[str | None, typer.Option(
     "--token", metavar="TOKEN", envvar="FACEGEN_STUDIO_TOKEN",
     help="What a visitor must bring, in the address; 'new' makes one.")]

@@ -5,18 +5,15 @@ from __future__ import annotations
 import contextlib
 import math
 
+import msgspec
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from studio_raw import CAMERA
+from viser import _messages
 
-msgspec = pytest.importorskip("msgspec")
-pytest.importorskip("viser")
-
-from viser import _messages  # noqa: E402
-
-from facegen.studio.limits import Limits  # noqa: E402
-from facegen.studio.wire import PART, Budget, Element, Gate, Refused, check_value, read  # noqa: E402
+from facegen.studio.limits import Limits
+from facegen.studio.wire import PART, Budget, Element, Gate, Refused, check_value, read
 
 UPLOAD = Element(files=True)
 texts = st.text(max_size=20)
