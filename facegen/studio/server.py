@@ -28,7 +28,8 @@ if TYPE_CHECKING:
     from websockets.asyncio.server import ServerConnection
     from websockets.http11 import Request, Response
 
-    from facegen.studio.wire import Element, Refused
+    from facegen.studio.gate import Element
+    from facegen.studio.wire import Refused
 
 log = logging.getLogger("facegen.studio")
 
@@ -105,7 +106,7 @@ class StudioServer:
         import_viser()
         from facegen.studio import seam
         from facegen.studio.connection import guarded
-        from facegen.studio.wire import Budget
+        from facegen.studio.gate import Budget
 
         self._seam, self.budget = seam, Budget(4 * self.limits.upload_bytes)
         self._page = front.Page(seam.page_file())

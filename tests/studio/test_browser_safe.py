@@ -115,7 +115,7 @@ def test_an_upload_that_is_refused_is_told_of_and_another_goes(serve, browser_pa
     (tmp_path / "large.glb").write_bytes(b"x" * 3_000_000)
     (tmp_path / "small.glb").write_bytes(b"x" * 1000)
     page.upload("Open", tmp_path / "large.glb")
-    page.says("large.glb has 2.9 MiB; the studio opens files of up to 1.0 MiB.")
+    page.says("large.glb has 2.9 MiB; the studio opens such files up to 1.0 MiB.")
     assert not came
     page.upload("Open", tmp_path / "small.glb")
     page.until(lambda: came == ["small.glb"])
