@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import logging
-import secrets
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -33,6 +31,8 @@ def studio(host: Host = "127.0.0.1", port: Port = None, token: Token = None, wor
 
     For example: facegen studio
     """
+    import secrets
+
     from facegen.studio import run
     from facegen.studio.needs import import_viser
 
@@ -61,6 +61,8 @@ def _started(found: Studio, *, browser: bool) -> None:
 
 def _tell_on_stderr() -> None:
     """Have what was refused or failed told in a line each."""
+    import logging
+
     handler = logging.StreamHandler(sys.stderr)
     handler.setFormatter(logging.Formatter("facegen studio: %(message)s"))
     log = logging.getLogger("facegen.studio")

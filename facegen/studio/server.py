@@ -76,7 +76,7 @@ class StudioServer:
         self._viser: viser.ViserServer | None = None
         self._works: dict[int, str] = {}        # of each page, by the number that viser gives it
         self._seen: set[str] = set()
-        self._open: set[ServerConnection] = set()
+        self._open: dict[ServerConnection, str] = {}        # the works of the pages that are connected
         self._last_told: dict[int, tuple[str, float]] = {}
         self._ready = False
 
@@ -156,8 +156,8 @@ class StudioServer:
         work = guard.work_of(path)
         if refusal is None and work is None and (path != "/" or websocket):
             refusal = guard.Refusal(404, "there is nothing here; the studio begins at /")
-        if refusal is None and work is not None:
-            refusal = self._full(work)
+        if refusal is None and work is not None and (websocket or work not in self._open.values()):
+            refusal = self._full(work)      # a page that is loaded again is still connected
         if refusal is not None:
             log.warning("refused %s %s: %s", "a websocket to" if websocket else "a request for", ascii(path[:80]),
                         refusal.why)
@@ -206,13 +206,13 @@ class StudioServer:
             await connection.close(1013, "too many pages are open")
             return
         self._seen.add(work)
-        self._open.add(connection)
+        self._open[connection] = work
         try:
             await viser_handler(connection)
         except Exception as error:
             log.error("a page was lost: %s", _told(error))
         finally:
-            self._open.discard(connection)
+            self._open.pop(connection, None)
             connection.gate.close()
             if connection.close_code == 1009:
                 log.warning("a page was sent away: it sent more than %d bytes at once", self.limits.message_bytes)
