@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -51,6 +52,10 @@ class AvatarPanel:
         self._ours = gui.add_dropdown("Or try one", (_NONE, *avatar_names()), initial_value=_NONE,
                                       hint="Heads that come with facegen, still without blendshapes.")
         self._ours.on_update(calls(self._chosen))
+        near = self.page.desk.shelf.names(TAKEN)
+        self._near = gui.add_dropdown("Or from a folder", (_NONE, *near), initial_value=_NONE, visible=bool(near),
+                                      hint="Files below the folders that were named with --open-folder.")
+        self._near.on_update(calls(self._found))
         self._seen = gui.add_checkbox("Show it in the picture", True)
         self._seen.on_update(calls(lambda: self.refresh(self.page.work)))
         with gui.add_folder("It lies down or looks away", expand_by_default=False) as self._axes:
@@ -90,13 +95,26 @@ class AvatarPanel:
     # -- step 1 -------------------------------------------------------------------------------------------------
     def _uploaded(self) -> None:
         given = self._upload.value
+        self._read(given.name, lambda: (given.name, given.content))
 
+    def _found(self) -> None:
+        name, self._near.value = self._near.value, _NONE
+
+        def take() -> tuple[str, bytes]:
+            path = self.page.desk.shelf.resolve(name, TAKEN)
+            return path.name, path.read_bytes()
+
+        if name != _NONE:
+            self._read(name, take)
+
+    def _read(self, title: str, take: Callable[[], tuple[str, bytes]]) -> None:
+        """Open what ``take`` returns, a file's name and content."""
         def read(report: Any) -> str:
             report("reading", 0.3)
-            return keep(self.folder, given.name, given.content)
+            return keep(self.folder, *take())
 
         with self._first:
-            Task(self.page, given.name[:60], read, self._opened)
+            Task(self.page, title[-60:], read, self._opened)
 
     def _chosen(self) -> None:
         if self._ours.value != _NONE:
