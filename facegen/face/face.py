@@ -190,6 +190,11 @@ class Face:
         """Where the head turns (3,), mm."""
         return self._data.head_pivot
 
+    @property
+    def eye_centres(self) -> Array:
+        """Where the left and the right eye turn (2, 3), mm."""
+        return self._data.eye_centres
+
     def neck_weight(self, detail: int = 2) -> Array:
         """Return how much of the head's turn each vertex (n, 1) of ``mesh(detail)`` makes."""
         return self._level(detail).head_weight
