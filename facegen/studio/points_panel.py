@@ -171,7 +171,7 @@ class PointsPanel:
 
     def _from_rest(self, work: Work, point: str) -> float:
         face = self._face
-        person = self.page.desk.person(work.face.person, self.page.name)
+        person = self.page.person()
         grip = Grip(face, point)
         rest = face.feature_point_places(face.mesh().vertices)[point]
         return float(np.linalg.norm(grip.places(raws.controls_of(work.face, face, person), np.zeros(3))[0] - rest))
@@ -212,7 +212,7 @@ class PointsPanel:
         if event.phase == "end":
             self._drag = None
         target = overlay.figure.unplace(event.end_position) + offset
-        person = self.page.desk.person(work.person, self.page.name)
+        person = self.page.person()
         moved = raws.dragged(work, face, person, name, target, mirrored=self._mirrored.value, grip=grip)
         self.page.change(f"drag {name}", thing=f"point {name}", face=replace(work, raw=moved))
 
@@ -259,7 +259,7 @@ class PointsPanel:
         deformation = raws.deformation_of(work.raw)
         about = f"Made by hand on the face {work.rig}."
         if self._what.value == _WHAT[1]:
-            meaning = work.meaning(self.page.desk.person(work.person, self.page.name))
+            meaning = self.page.meaning()
             deformation = whole_pose(face, meaning.deformation, *meaning.more, units=deformation.units)
             about = f"{work.script}, and what was moved by hand on the face {work.rig}."
         if not deformation:
