@@ -293,7 +293,7 @@ def said(point: str, face: Face) -> str:
 
 
 def whole_pose(face: Face | None, *several: Deformation, units: str) -> Deformation:
-    """Return a sum of movements in one unit of length, without points that the face lacks or that take no vector.
+    """Return a sum of movements in one unit of length, without points and folds that the face lacks.
 
     face: None for an avatar, which cannot convert lengths: InputError if they differ.
     """
@@ -304,7 +304,9 @@ def whole_pose(face: Face | None, *several: Deformation, units: str) -> Deformat
         return total
     total = face.total(*several, units=units)
     strange = raws.strangers(total.as_dict(), face)
-    return replace(total, points={name: one for name, one in total.points.items() if name not in strange})
+    return replace(total, points={name: one for name, one in total.points.items() if name not in strange},
+                   folds={name: one for name, one in total.folds.items() if name in face.fold_names},
+                   with_jaw=tuple(name for name in total.with_jaw if name in face.feature_points))
 
 
 def read_raw(name: str, content: bytes) -> raws.Raw:

@@ -114,7 +114,8 @@ def scale_of(data: Data, code: str) -> float:
 
 def with_scale(data: Data, code: str, scale: float) -> dict[str, Any]:
     """Return data in which a unit makes so much of the common movement."""
-    return _set(data, code, {} if scale == 1.0 and code not in _sided(data, code) else {code: {"scale": round(scale, 3)}})
+    common = scale == 1.0 and not _sided(data, code)
+    return _set(data, code, {} if common else {code: {"scale": round(scale, 3)}})
 
 
 def without_unit(data: Data, code: str) -> dict[str, Any]:
@@ -155,10 +156,10 @@ def _atoms(unit: Unit, code: str) -> tuple[str, ...]:
     return unit.atoms if code == unit.number else (code,)
 
 
-def _sided(data: Data, code: str) -> tuple[str, ...]:
-    """Return what still holds for a side where its own entry is taken out: that of both."""
-    unit = load_catalogue().unit_of(code)
-    return (code,) if code != unit.number and unit.number in (data.get("units") or {}) else ()
+def _sided(data: Data, code: str) -> bool:
+    """Return whether an entry of both sides would hold for a side whose own is taken out."""
+    number = load_catalogue().unit_of(code).number
+    return code != number and number in (data.get("units") or {})
 
 
 def _set(data: Data, code: str, entries: Mapping[str, Any]) -> dict[str, Any]:

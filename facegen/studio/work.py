@@ -136,8 +136,8 @@ class AvatarWork:
 class TableWork:
     """A person's table on its way to a file.
 
-    file: the name it is saved under among the work's people (`Desk.people`), or None while there is no person. data: the
-    table as plain data (docs/tables.md); one without habits yet is no error here.
+    file: the name it is saved under among the work's people (`Desk.people`), or None while there is no person. data:
+    the table as plain data (docs/tables.md); one without habits yet is no error here.
     """
 
     file: str | None = None
