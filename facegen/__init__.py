@@ -48,6 +48,7 @@ if TYPE_CHECKING:
     from facegen.jobs.batch import run_batch
     from facegen.jobs.frames import save_clip, save_turn
     from facegen.jobs.rigging import rig
+    from facegen.landmarking.propose import Proposer, propose_landmarks
     from facegen.render import Renderer, Wireframe, render, render_passes, save_passes
     from facegen.render.live import Live
     from facegen.transfer.rig import Rigging, avatar_names
@@ -75,6 +76,7 @@ __all__ = [
     "Performance",
     "Pinhole",
     "Playback",
+    "Proposer",
     "Recipe",
     "Renderer",
     "Resolution",
@@ -106,6 +108,7 @@ __all__ = [
     "parse",
     "people",
     "presets",
+    "propose_landmarks",
     "render",
     "render_passes",
     "resolve",
@@ -156,6 +159,7 @@ _HOMES = {
     "facegen.jobs.batch": ("run_batch",),
     "facegen.jobs.frames": ("save_clip", "save_turn"),
     "facegen.jobs.rigging": ("rig",),
+    "facegen.landmarking.propose": ("Proposer", "propose_landmarks"),
     "facegen.render.live": ("Live",),
     "facegen.render.overlay": ("Wireframe",),
     "facegen.render.passes": ("render_passes",),

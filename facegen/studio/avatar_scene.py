@@ -116,8 +116,13 @@ class AvatarScene:
         if len(known) >= 3:
             low, high = known.min(axis=0), known.max(axis=0)
             middle = (low + high) / 2
-            # A part is at least half of what it is on the base face: few points do not say how large it is.
-            reach = max(0.62 * float(np.linalg.norm((high - low)[:2])), 0.5 * reach)
-        yaw, pitch = (0.0, 0.0) if name is None else view_of(name)
-        self.page.stage.look(BESIDE + middle, yaw=yaw, pitch=pitch, distance=_ROOM * reach / _HALF_ANGLE)
+            # A part is hardly smaller than the base face's: few points do not say how large it is.
+            reach = max(0.62 * float(np.linalg.norm((high - low)[:2])), 0.85 * reach)
+        self.turn(BESIDE + middle, (reach, reach), view=(0.0, 0.0) if name is None else view_of(name))
         return reach
+
+    def turn(self, middle: Array, half: tuple[float, float], view: tuple[float, float] = (0.0, 0.0)) -> None:
+        """Turn the camera to a place, so far that half a width and a height, mm, are seen to each side of it."""
+        wide = float(getattr(self.page.client.camera, "aspect", 1.0))
+        distance = _ROOM * max(half[0] / wide, half[1]) / _HALF_ANGLE
+        self.page.stage.look(middle, yaw=view[0], pitch=view[1], distance=distance)

@@ -16,7 +16,7 @@ from facegen.studio.latest import Latest
 from facegen.studio.markers import BLUE, GREEN, ORANGE, Mark, Markers
 from facegen.studio.page import Page
 from facegen.studio.picking import CONFIRMED, OPEN, PROPOSED, SKIPPED, place, words_for
-from facegen.studio.proposing import Adviser, Proposals
+from facegen.studio.proposing import FOUND, Advice, Adviser, adviser_of
 from facegen.studio.work import AvatarWork, Work
 
 _NEXT = "the next one"
@@ -34,7 +34,7 @@ class PickerView:
     def __init__(self, page: Page, scene: AvatarScene) -> None:
         self.page, self.scene = page, scene
         self.chosen: str | None = None
-        self.proposals = Proposals()
+        self.proposals = Advice()
         self._adviser: Adviser | None = None
         self._known: Any = None                 # what the proposals are of, or will be
         self._asked: tuple[str, ...] = ()       # what the picture was turned to
@@ -42,6 +42,7 @@ class PickerView:
         self._reach = room_of("whole")[1]
         self._listens = False
         self._stamp: Any = None                 # what is shown
+        self._question: Any = None              # what is asked for, and of which work
         self.markers = Markers(
             page.client.scene, lambda name: page.calls(lambda event: self._dragged(name, event)))
         self._thinking = Latest("proposals", page.fault)
@@ -89,6 +90,15 @@ class PickerView:
         """Whether points are being placed."""
         return bool(self._on.value) and self.scene.figure is not None
 
+    @property
+    def _looks(self) -> bool:
+        """Whether a face is still being looked for."""
+        return self._adviser is None or not self._adviser.ready
+
+    def _found(self, avatar: AvatarWork) -> bool:
+        """Whether a face was found before any point was placed."""
+        return not avatar.landmarks and self.proposals.sure >= FOUND
+
     def start(self) -> None:
         """Begin to place points."""
         self._on.value = True
@@ -96,11 +106,15 @@ class PickerView:
     def forget(self) -> None:
         """Another avatar has come: nothing is known of it."""
         self.chosen, self._adviser, self._known, self._asked = None, None, None, ()
-        self.proposals = Proposals()
+        self.proposals = Advice()
 
     def wanted(self, work: AvatarWork) -> str | None:
         """Return the point that is asked for."""
-        return picking.wanted(work, chosen=self.chosen, advised=self.proposals.advised)
+        # Advice that comes later does not change the question that a person is about to answer.
+        of = (work.file, work.landmarks, work.skipped, self.chosen)
+        if self._question is None or self._question[0] != of:
+            self._question = of, picking.wanted(work, chosen=self.chosen, advised=self.proposals.advised)
+        return self._question[1]
 
     def refresh(self, work: Work) -> None:
         """Show a work."""
@@ -144,6 +158,12 @@ class PickerView:
             self._ask.content = f"{done} of {len(REQUIRED)} points are placed." if avatar.landmarks else ""
         elif name is None:
             self._ask.content = "All points are placed: go on to **3 Blendshapes**, or click on a ball to move it."
+        elif self._looks and not avatar.landmarks:
+            self._ask.content = (f"**{WORDS[name].label}**\n\n{WORDS[name].where}\n\nfacegen is looking for a face "
+                                 "meanwhile ...")
+        elif self._found(avatar):
+            self._ask.content = ("**A face was found.** Look at the blue balls: drag those that are not right, then "
+                                 f"take them all. Or click one by one: {WORDS[name].label}. {WORDS[name].where}")
         else:
             what = "needed" if name in REQUIRED else "optional"
             again = " It is placed; click to move it." if name in avatar.landmarks else ""
@@ -191,7 +211,10 @@ class PickerView:
     # -- the picture --------------------------------------------------------------------------------------------
     def _turn(self, avatar: AvatarWork, name: str | None) -> None:
         """Turn the picture to the part of the point that is asked for, once."""
-        part = "whole" if name is None else WORDS[name].part
+        # A face that was found is looked at as a whole first.
+        whole = name is None or (self._found(avatar) and self.chosen is None)
+        part = "whole" if whole else WORDS[name].part
+        name = None if whole else name
         known = name in avatar.landmarks or name in self.proposals.places
         asked = (part, str(view_of(name)) if name else "", str(known))
         if asked == self._asked or not (self._follow.value or not self._asked):
@@ -288,7 +311,7 @@ class PickerView:
     # -- proposals ----------------------------------------------------------------------------------------------
     def _advise(self) -> Adviser:
         if self._adviser is None or self._adviser.mesh is not self.scene.mesh:
-            self._adviser = Adviser(self.scene.mesh)
+            self._adviser = adviser_of(self.scene.mesh)
         return self._adviser
 
     def _think(self, avatar: AvatarWork) -> None:
@@ -299,13 +322,28 @@ class PickerView:
         self._known = known
 
         def think() -> None:
-            found = self._advise().proposals(avatar)
-            with self.page.lock:
-                if self._known is known:
-                    self.proposals = found
-                    self.show(self.page.work.avatar)
+            adviser = self._advise()
+            if not adviser.ready:
+                self._advised(known, adviser.first(avatar))
+            self._advised(known, adviser.advice(avatar))
 
         self._thinking.ask(think)
+
+    def _advised(self, known: Any, advice: Advice) -> None:
+        """Show advice, if the points are still those that it is of."""
+        with self.page.lock:
+            if self._known is not known:
+                return
+            self.proposals = advice
+            avatar = self.page.work.avatar
+            usual = AvatarWork()
+            if (advice.stands and not avatar.landmarks and advice.stands != (avatar.up, avatar.front)
+                    and (avatar.up, avatar.front) == (usual.up, usual.front)):
+                up, front = advice.stands
+                self.page.change("stand the avatar up", avatar=replace(avatar, up=up, front=front))
+                self.page.say(f"In this file +{up} is up and it looks to +{front}.".replace("+-", "-"),
+                              "The avatar was turned")
+            self.refresh(self.page.work)
 
     def settle(self) -> bool:
         """Wait until proposals are there."""

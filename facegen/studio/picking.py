@@ -64,15 +64,15 @@ def as_places(landmarks: Landmarks) -> dict[str, Place]:
 def wanted(work: AvatarWork, *, chosen: str | None = None, advised: str | None = None) -> str | None:
     """Return the point to ask for, or None when there is nothing to ask.
 
-    chosen: by the person; goes first, placed or not. advised: what would help most, if anybody knows.
+    chosen: by the person; goes first, placed or not. advised: what would help most, if anybody knows. A point whose
+    partner is placed has time: it is known by mirroring.
     """
     if chosen is not None:
         return chosen
     left = [name for name in ORDER if state(work, name) == OPEN]
-    required = [name for name in left if name in REQUIRED]
-    if advised in (required or left):
-        return advised
-    return next(iter(required or left), None)
+    left = [name for name in left if name in REQUIRED] or left
+    left = [name for name in left if partner(name) not in work.landmarks] or left
+    return advised if advised in left else next(iter(left), None)
 
 
 def state(work: AvatarWork, name: str, proposed: Iterable[str] = ()) -> str:

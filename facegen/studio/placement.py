@@ -32,6 +32,12 @@ def axes(up: str, front: str) -> Array:
     return np.array([np.cross(y, z), y, z])
 
 
+def nearest_axes(rotation: Array) -> tuple[str, str]:
+    """Return the pair ``up, front`` whose rotation is nearest to one (3, 3)."""
+    pairs = [(up, front) for up in AXES for front in AXES if across(up, front)]
+    return max(pairs, key=lambda pair: float((axes(*pair) * rotation).sum()))
+
+
 def _unit(axis: str) -> Array:
     return np.eye(3)["xyz".index(axis[-1])] * (-1.0 if axis[0] == "-" else 1.0)
 

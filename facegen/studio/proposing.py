@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,59 +14,87 @@ from facegen.errors import InputError
 from facegen.geometry.closest import ClosestPoints
 from facegen.geometry.mesh import Mesh
 from facegen.geometry.operators import Surface
+from facegen.landmarking.propose import Proposer
 from facegen.studio.landmark_words import ORDER, partner
-from facegen.studio.picking import Place, as_landmarks, as_places, missing, place, point
-from facegen.studio.placement import axes
+from facegen.studio.picking import Place, as_landmarks, missing, place, point
+from facegen.studio.placement import axes, nearest_axes
 from facegen.studio.work import AvatarWork
 from facegen.transfer.alignment import align
 from facegen.transfer.landmark_checks import average_face
-from facegen.transfer.landmarks import check_places, snap
+from facegen.transfer.landmarks import check_places
 
 Array = NDArray[np.float64]
 
+FOUND = 0.6
+"""From this sureness on, 0..1, a face was found without any point placed."""
+
+# A guess that is less sure than this is not worth a look.
+_LEAST = 0.08
+# A mirrored place, before anything else is known.
+_MIRRORED = 0.9
+
 
 @dataclass(frozen=True)
-class Proposals:
+class Advice:
     """``places`` and ``confidence`` 0..1 by landmark, none that is confirmed; ``advised``: what to place next;
-    ``errors`` and ``warnings``: sentences about what was placed."""
+    ``sure``: how surely there is a face, 0..1; ``stands``: (up, front), axes of the file, if that shows; ``errors``
+    and ``warnings``: sentences about what was placed."""
 
     places: Mapping[str, Place] = field(default_factory=dict)
     confidence: Mapping[str, float] = field(default_factory=dict)
     advised: str | None = None
+    sure: float = 0.0
+    stands: tuple[str, str] | None = None
     errors: tuple[str, ...] = ()
     warnings: tuple[str, ...] = ()
 
 
+@lru_cache(maxsize=4)       # finding a face takes seconds, and a page that is loaded again has the same mesh
+def adviser_of(mesh: Mesh) -> Adviser:
+    """Return the adviser of a mesh, the same for all who ask."""
+    return Adviser(mesh)
+
+
 class Adviser:
-    """What is known of one avatar's mesh; made once, asked after each step."""
+    """What is known of one avatar's mesh; made once, asked after each step. ``ready``: whether `advice` is quick.
+
+    Threads take turns.
+    """
 
     def __init__(self, mesh: Mesh) -> None:
         self.mesh = mesh
+        self.ready = False
+        self._lock = threading.Lock()
         used = mesh.vertices[np.unique(mesh.faces)]
         self._middle = (used.min(axis=0) + used.max(axis=0)) / 2
         self._closest = ClosestPoints(Surface(mesh.vertices, mesh.faces))
+        self._proposer = Proposer(mesh)
 
-    def proposals(self, work: AvatarWork) -> Proposals:
-        """Return what the points of a work say of the others."""
-        errors, warnings = self.faults(work)
-        known = {name: point(self.mesh, one) for name, one in work.landmarks.items()}
-        found: dict[str, Place] = {}
-        if len(known) >= 6:
-            try:
-                back = align(known, average_face()).inverse()
-                found = as_places(snap({name: back.apply(at) for name, at in average_face().items()
-                                        if name not in known}, self.mesh))
-            except InputError:
-                pass
-        for name in known:
+    def first(self, work: AvatarWork) -> Advice:
+        """Return at once what mirroring says: the face is still being looked for."""
+        found = {}
+        for name, one in work.landmarks.items():
             pair = partner(name)
-            if pair is not None and pair not in known:
-                found[pair] = self.mirrored(work, name, work.landmarks[name])
-        found = {name: found[name] for name in ORDER if name in found}
-        return Proposals(found, dict.fromkeys(found, 0.5), None, errors, warnings)
+            if pair is not None and pair not in work.landmarks:
+                found[pair] = self.mirrored(work, name, one)
+        return Advice(found, dict.fromkeys(found, _MIRRORED))
 
-    def faults(self, work: AvatarWork) -> tuple[tuple[str, ...], tuple[str, ...]]:
-        """Return (errors, warnings), sentences, about the points of a work."""
+    def advice(self, work: AvatarWork) -> Advice:
+        """Return what the points of a work say of the others; the first time takes seconds."""
+        known = {name: (one["face"], tuple(one["barycentric"])) for name, one in work.landmarks.items()}
+        with self._lock:
+            proposed = self._proposer.propose(known)
+        self.ready = True
+        guesses = {name: proposed[name] for name in ORDER if name in proposed and name not in known
+                   and proposed[name].confidence >= _LEAST}
+        errors, warnings = self._faults(work)
+        return Advice({name: place(one.face, one.barycentric) for name, one in guesses.items()},
+                      {name: one.confidence for name, one in guesses.items()}, proposed.ask, proposed.face,
+                      _standing({name: one.xyz for name, one in proposed.items()}) if proposed.face >= FOUND else None,
+                      errors, tuple(dict.fromkeys((*proposed.warnings, *warnings))))
+
+    def _faults(self, work: AvatarWork) -> tuple[tuple[str, ...], tuple[str, ...]]:
+        """Return (errors, warnings), sentences, about the points of a work, once all are placed."""
         if missing(work):
             return (), ()
         try:
@@ -98,3 +128,11 @@ class Adviser:
         else:
             normal = axes(work.up, work.front)[0]
         return normal, np.mean(middles, axis=0) if middles else self._middle
+
+
+def _standing(points: Mapping[str, Array]) -> tuple[str, str] | None:
+    """Return the axes in which a face with landmarks at points (3,) stands and looks."""
+    try:
+        return nearest_axes(align(points, average_face()).rotation)
+    except InputError:
+        return None

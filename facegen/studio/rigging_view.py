@@ -35,8 +35,8 @@ _SETS = {
     "visemes": ("Visemes", "Mouths of speech sounds."),
     "vrm": ("VRM's presets", "What programs for VRM avatars ask for."),
 }
-# Because at this distance, mm, two heads side by side fill the picture.
-_BOTH = 1150.0
+# Half the width and height of a head with room about it, mm.
+_HEAD = (100.0, 140.0)
 
 
 class RiggingView:
@@ -196,9 +196,9 @@ class RiggingView:
     def _compared(self) -> None:
         self.page.refresh()
         if self.compares:
-            both = self.page.work.face.rig == FaceWork().rig
-            self.page.stage.look(np.array([BESIDE[0] / 2 if both else 0.0, -15.0, 0.0]),
-                                 distance=_BOTH if both else 1.5 * _BOTH)
+            heads = 2 if self.page.work.face.rig == FaceWork().rig else 3
+            self.scene.turn(np.array([BESIDE[0] / 2 if heads == 2 else 0.0, -15.0, -40.0]),
+                            ((heads - 1) * BESIDE[0] / 2 + _HEAD[0], _HEAD[1]))
 
     def _split_pieces(self, avatar: AvatarWork) -> None:
         """Have the pieces found beside the page, once the points are placed."""

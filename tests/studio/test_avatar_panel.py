@@ -1,14 +1,19 @@
 """The Avatar tab with a client that is no browser: clicks are rays, and what they make is in the work."""
 
+from typing import ClassVar
+
 import numpy as np
 import pytest
 from fake_client import FakeClient
 
 from facegen.face.landmarks import REQUIRED
+from facegen.landmarking.propose import Proposal, Proposals
+from facegen.studio import picking, proposing
 from facegen.studio.avatar_panel import AvatarPanel
 from facegen.studio.avatar_scene import AVATAR
 from facegen.studio.desk import Desk
 from facegen.studio.landmark_words import ORDER, WORDS
+from facegen.studio.markers import BLUE, GREEN, ORANGE
 from facegen.studio.page import Page
 from facegen.studio.picking import as_places, point
 from facegen.transfer.landmarks import load_landmarks
@@ -58,6 +63,30 @@ class Opened:
         self.page.change("all", avatar=replace(self.work, landmarks=as_places(self.marks)))
 
 
+class Blind:
+    """Proposes what `found` says, and mirrors nothing: a face is not looked for, which takes seconds."""
+
+    found: ClassVar = {}
+
+    def __init__(self, mesh):
+        self.mesh = mesh
+
+    def propose(self, known):
+        places = {name: Proposal(name, one["face"], np.array(one["barycentric"]), point(self.mesh, one), sure, "laid")
+                  for name, (one, sure) in self.found.items() if name not in known}
+        return Proposals(places, 0.0, (), None, self.mesh)
+
+
+@pytest.fixture(autouse=True)
+def blind(monkeypatch):
+    """No test here looks for faces."""
+    monkeypatch.setattr(proposing, "Proposer", Blind)
+    monkeypatch.setattr(Blind, "found", {})
+    proposing.adviser_of.cache_clear()
+    yield Blind
+    proposing.adviser_of.cache_clear()
+
+
 @pytest.fixture
 def opened(tmp_path):
     made = Opened(tmp_path)
@@ -74,8 +103,8 @@ def test_points_are_placed_by_clicks_one_after_another(opened):
     assert opened.panel.scene.figure is opened.page.stage.figures[AVATAR]
     for count in range(4):
         name = opened.panel.picker.wanted(opened.work)
-        assert WORDS[name].label in next(one.content for one in opened.gui.made if "needed" in str(
-            getattr(one, "content", "")))
+        assert WORDS[name].label in opened.panel.picker._ask.content
+        assert WORDS[name].where in opened.panel.picker._ask.content
         opened.click(name)
         assert opened.panel.picker.settle()
         assert len(opened.work.landmarks) == count + 1
@@ -124,6 +153,36 @@ def test_what_is_dragged_goes_over_the_surface_and_takes_its_partner_along(opene
     ball.press(phase="end", end_position=tuple(at))
     assert opened.off("eye_outer_L") > 2.0
     assert opened.off("eye_outer_R") < 0.1
+
+
+def test_proposals_are_shown_by_sureness_and_taken(opened, blind):
+    true = as_places(opened.marks)
+    blind.found = {"nose_tip": (true["nose_tip"], 0.9), "mouth_top": (true["mouth_top"], 0.2),
+                   "chin": (true["chin"], 0.001)}
+    opened.click("eye_inner_L")
+    assert opened.panel.picker.settle()
+    marks = opened.panel.picker.markers.marks
+    assert set(marks) == {"eye_inner_L", "nose_tip", "mouth_top"}, "who knows nothing says nothing"
+    assert marks["eye_inner_L"].colour == GREEN
+    assert marks["mouth_top"].colour == BLUE
+    assert marks["mouth_top"].opacity < marks["nose_tip"].opacity < 1.0
+    opened.gui.find("Point").enter(WORDS["mouth_top"].label)
+    assert opened.panel.picker.markers.marks["mouth_top"].colour == ORANGE
+    opened.gui.find("Take this proposal").press()
+    assert opened.work.landmarks["mouth_top"] == true["mouth_top"]
+    opened.gui.find("Take all proposals (1)").press()
+    assert opened.work.landmarks["nose_tip"] == true["nose_tip"]
+    assert opened.panel.picker.settle()
+    assert not opened.panel.picker._all.visible
+
+
+def test_a_partner_is_proposed_while_the_face_is_looked_for(opened):
+    adviser = proposing.Adviser(opened.mesh)
+    work = picking.placed(opened.work, "eye_outer_L", as_places(opened.marks)["eye_outer_L"])
+    mirrored = adviser.first(work).places["eye_outer_R"]
+    placement = opened.panel.scene.placement
+    assert placement.apply(point(opened.mesh, mirrored)) == pytest.approx(
+        placement.apply(opened.true["eye_outer_R"]), abs=0.5)
 
 
 def test_optional_points_can_be_skipped_and_any_point_be_placed_anew(opened):

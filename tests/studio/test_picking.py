@@ -45,8 +45,10 @@ def test_all_required_points_are_asked_for_before_any_optional_one():
     while (name := wanted(work)) is not None:
         asked.append(name)
         work = picking.placed(work, name, HERE)
-    assert tuple(asked) == ORDER
+    assert sorted(asked) == sorted(NAMES)
     assert set(asked[:len(REQUIRED)]) == set(REQUIRED)
+    lone = [name for name in asked[:len(REQUIRED)] if not name.endswith("_R")]
+    assert lone == asked[:len(lone)] == [name for name in ORDER if name in lone], "what mirroring tells comes last"
     assert not picking.missing(work)
 
 
@@ -58,6 +60,7 @@ def test_who_chooses_goes_first_then_advice_then_the_order():
     assert wanted(work, chosen="jaw_L", advised="chin") == "jaw_L"
     work = picking.placed(work, "chin", HERE)
     assert wanted(work, advised="chin") == ORDER[0], "advice that is old"
+    assert wanted(picking.placed(work, "nose_wing_L", HERE), advised="nose_wing_R") == ORDER[0], "mirroring tells it"
     assert wanted(work, chosen="chin") == "chin", "a point that is placed can be placed anew"
 
 
