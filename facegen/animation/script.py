@@ -16,8 +16,8 @@ from facegen.animation.layer import Layer
 from facegen.animation.speech_script import NO_FILES, read_speech_entry
 from facegen.animation.timing import load_timing
 from facegen.errors import FacegenError, InputError, TableError
-from facegen.facs.expression_table import Person, is_path, load_person
 from facegen.facs.deformation import deformation_from_entry
+from facegen.facs.expression_table import Person, is_path, load_person
 from facegen.facs.expressions import Resolution, resolve
 from facegen.facs.tables import load_units
 from facegen.facs.validate import Entry
@@ -209,7 +209,7 @@ class _Reader:
         if "raw" in fields:
             raw = deformation_from_entry(fields["raw"]) * intensity
             if any(pose.raw is not None for pose in poses):
-                raise fields["raw"].fail("the pose is raw data already; give units in pose, or leave one of the two out")
+                raise fields["raw"].fail("the pose is raw data already; give it units, or leave one of the two out")
             poses.append(Pose(raw=raw))
         for part in ("head", "eyes"):
             if part in fields:

@@ -1,4 +1,4 @@
-"""Recordings that a person opened: kept in the folder of the work, so that a reload finds them, and read with limits."""
+"""Recordings that a person opened: kept in the folder of the work, so a reload finds them, read with limits."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from facegen.animation.performance import Performance
 from facegen.animation.streams import load_performance
-from facegen.animation.streams.calibrate import Calibration, calibrated, parse_calibration
+from facegen.animation.streams.calibrate import calibrated, parse_calibration
 from facegen.animation.streams.files import FORMATS
 from facegen.animation.streams.smooth import OneEuro, smoothed
 from facegen.codec.decoder import Decoder

@@ -19,13 +19,13 @@ def write(script: Mapping[str, Any]) -> str:
     lines: list[str] = []
     for key, value in script.items():
         if key in _LISTS:
-            lines += [f"{key}:", *(f"  - {_flow(one)}" for one in value)]
+            lines += [f"{key}:", *(f"  - {flow(one)}" for one in value)]
         elif key == "tracks":
             lines.append("tracks:")
             for track in value:
                 lines += _track(track)
         else:
-            lines.append(f"{key}: {_flow(value)}")
+            lines.append(f"{key}: {flow(value)}")
     return "\n".join(lines) + "\n" if lines else ""
 
 
@@ -44,13 +44,14 @@ def _track(track: Mapping[str, Any]) -> list[str]:
     for key, value in track.items():
         start = "  - " if not lines else "    "
         if key in _LISTS:
-            lines += [f"{start}{key}:", *(f"      - {_flow(one)}" for one in value)]
+            lines += [f"{start}{key}:", *(f"      - {flow(one)}" for one in value)]
         else:
-            lines.append(f"{start}{key}: {_flow(value)}")
+            lines.append(f"{start}{key}: {flow(value)}")
     return lines
 
 
-def _flow(value: Any) -> str:
+def flow(value: Any) -> str:
+    """Return plain data as YAML on one line."""
     import yaml
 
     # No line is broken: one key, one line.

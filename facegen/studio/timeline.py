@@ -3,8 +3,8 @@
 Edits see to the script's form; what its words mean, which may depend on a person, `read` says.
 
 A track is named by where it stands in the script: "keyframes" and "events" at the top, "tracks.0" and so on below them,
-"speech". `NEW` is a track that the edit makes. Keyframes stay in order of time; a key that is set where one stands takes
-its place. A script without anything left is empty.
+"speech". `NEW` is a track that the edit makes. Keyframes stay in order of time; a key that is set where one stands
+takes its place. A script without anything left is empty.
 """
 
 from __future__ import annotations

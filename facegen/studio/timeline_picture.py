@@ -112,8 +112,9 @@ class Drawing:
 
     def _event(self, item: Mapping[str, Any], y: float, lit: bool) -> str:
         at, onset, apex, end = (self._x(t) for t in event_times(item))
-        return (f'<path d="M{at:.1f},{y + 4:.1f} L{onset:.1f},{y - 5:.1f} L{apex:.1f},{y - 5:.1f} L{end:.1f},{y + 4:.1f}'
-                f' z" fill="{_MARK if lit else "#8aa"}" stroke="{_INK}" stroke-width="0.6">{_title(item)}</path>')
+        low, high = f"{y + 4:.1f}", f"{y - 5:.1f}"
+        return (f'<path d="M{at:.1f},{low} L{onset:.1f},{high} L{apex:.1f},{high} L{end:.1f},{low} z" '
+                f'fill="{_MARK if lit else "#8aa"}" stroke="{_INK}" stroke-width="0.6">{_title(item)}</path>')
 
     def _ticks(self, y: float) -> list[str]:
         step = 10.0 ** math.floor(math.log10(self.duration / _MOST_TICKS))
