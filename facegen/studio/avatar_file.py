@@ -53,14 +53,14 @@ class Opened:
         return f"{Path(self.name).stem}{'.vrm' if self.path.suffix.lower() == '.vrm' else '.glb'}"
 
 
-def safe_name(name: str) -> str:
+def safe_name(name: str, taken: tuple[str, ...] = TAKEN, kind: str = "an avatar") -> str:
     """Return a file's name without what could lead out of a folder; InputError for a kind that is not taken."""
     base = str(name).replace("\\", "/").rsplit("/", 1)[-1]
     stem, dot, suffix = base.rpartition(".")
     suffix = f"{dot}{suffix}".lower()
-    if suffix not in TAKEN:
-        raise InputError(f"file: expected an avatar that ends in {', '.join(TAKEN)}, got '{base[:_LONGEST]}'")
-    stem = _UNSAFE.sub("_", stem).strip("._") or "avatar"
+    if suffix not in taken:
+        raise InputError(f"file: expected {kind} that ends in {', '.join(taken)}, got '{base[:_LONGEST]}'")
+    stem = _UNSAFE.sub("_", stem).strip("._") or kind.split()[-1]
     return stem[:_LONGEST] + suffix
 
 
