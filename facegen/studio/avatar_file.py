@@ -15,6 +15,7 @@ from facegen.errors import FileError, InputError
 from facegen.fileio.avatar import AvatarFile, load_avatar
 from facegen.fileio.textfile import make_folder, whole_file
 from facegen.studio.limits import MEBIBYTE, Limits
+from facegen.studio.reading import read_avatar_safely
 from facegen.transfer.rig import avatar_files, avatar_names
 
 FOLDER = "avatar"
@@ -66,7 +67,7 @@ def safe_name(name: str) -> str:
 def keep(folder: Path, name: str, content: bytes) -> str:
     """Keep a file that came from a browser in a work's folder and return its name there; InputError if it is too much.
 
-    It is read before it is kept: what cannot be opened leaves what was there as it was.
+    It is read before it is kept, by a process of its own: what cannot be opened leaves what was there as it was.
     """
     name = safe_name(name)
     if len(content) > LIMITS.file_bytes:
@@ -79,7 +80,7 @@ def keep(folder: Path, name: str, content: bytes) -> str:
         try:
             trial.write_bytes(content)
             with called(trial, name):
-                _check(load_avatar(trial), name)
+                _check(read_avatar_safely(trial, LIMITS), name)
             trial.replace(draft)
         finally:
             trial.unlink(missing_ok=True)
@@ -92,7 +93,7 @@ def called(path: Path, name: str) -> Iterator[None]:
     try:
         yield
     except InputError as error:
-        raise InputError(str(error).replace(str(path), name)) from None
+        raise InputError(str(error).replace(str(path), name).replace(path.name, name)) from None
 
 
 def open_avatar(folder: Path, name: str) -> Opened:
@@ -117,9 +118,6 @@ def _check(avatar: AvatarFile, name: str) -> None:
     mesh = avatar.mesh
     if not len(mesh.faces):
         raise InputError(f"'{name}' has no triangles: there is nothing to put a face on")
-    if len(mesh.faces) > LIMITS.triangles:
-        raise InputError(f"'{name}' has {len(mesh.faces):,} triangles, the studio takes up to {LIMITS.triangles:,}; "
-                         "make fewer of them first (in Blender: the Decimate modifier), or use the command facegen rig")
     used = mesh.vertices[np.unique(mesh.faces)]
     bad = int((~np.isfinite(used).all(axis=1)).sum())
     if bad:

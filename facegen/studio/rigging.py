@@ -134,6 +134,6 @@ def pieces(work: AvatarWork, opened: Opened) -> list[dict[str, object]]:
     return sorted(describe(found.pieces), key=lambda row: -row["triangles"])
 
 
-def preview(face: AvatarFace, folder: Path, opened: Opened) -> Path:
+def preview(face: AvatarFace, folder: Path, opened: Opened, report: Report) -> Path:
     """Draw the sheet of a rigged avatar and return its file."""
-    return save_preview(face, make_folder(folder / FOLDER) / f"{Path(opened.output).stem}.png")
+    return save_preview(face, make_folder(folder / FOLDER) / f"{Path(opened.output).stem}.png", progress=report)

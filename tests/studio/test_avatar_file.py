@@ -51,13 +51,7 @@ def test_shipped_avatars_are_opened_by_name(name, tmp_path):
     ("a.obj", b"v 0 0 0\n", "triangle|face"),
     ("a.obj", b"v 0 0 0\nv nan 0 0\nv 0 1 0\nf 1 2 3\n", "NaN|finite|number"),
     ("a.obj", b"v 1 1 1\nv 1 1 1\nv 1 1 1\nf 1 2 3\n", "one place"),
-    ("a.obj", b"v 0 0 0\nf 1 2 9\n", "9"),
-    ("a.glb", b"", "glb"),
-    ("a.glb", b"glTF" + bytes(20), "glb"),
-    ("a.glb", b"\x00" * 5000, "glb"),
     ("a.vrm", TRIANGLE, "vrm"),
-    ("a.ply", b"ply\nformat ascii 1.0\nelement vertex 999999999\n", "ply"),
-    ("a.stl", b"solid", "stl"),
     ("a.gltf", b'{"asset": {"version": "2.0"}, "buffers": [{"uri": "../../etc/passwd", "byteLength": 9}]}', "gltf"),
 ])
 def test_hostile_files_are_refused_and_leave_nothing(tmp_path, name, content, said):
@@ -73,7 +67,7 @@ def test_what_is_too_much_is_refused(tmp_path, monkeypatch):
     monkeypatch.setattr(avatar_file, "LIMITS", Limits(file_bytes=100, triangles=1))
     with pytest.raises(InputError, match="MB, the studio takes up to"):
         keep(tmp_path, "a.obj", TRIANGLE + b"#" * 100)
-    with pytest.raises(InputError, match="2 triangles, the studio takes up to 1"):
+    with pytest.raises(InputError, match=r"^a\.obj: has 2 triangles; the studio opens avatars of up to 1"):
         keep(tmp_path, "a.obj", TRIANGLE + b"v 0 0 1\nf 1 2 4\n")
     assert not list((tmp_path / FOLDER).iterdir())
 
