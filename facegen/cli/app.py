@@ -28,6 +28,7 @@ from facegen.cli import (
 from facegen.cli import fit as fitting
 from facegen.cli import rig as rigging
 from facegen.cli import stream as streaming
+from facegen.cli import studio as studying
 from facegen.errors import FacegenError, InputError
 
 DONE, STOPPED, WRONG = 0, 1, 2
@@ -56,6 +57,7 @@ app.command("convert")(convert.convert)
 app.command("adopt")(adopting.adopt)
 app.command("encode")(streaming.encode)
 app.command("decode")(streaming.decode)
+app.command("studio")(studying.studio)
 
 
 def _version(asked: bool) -> None:

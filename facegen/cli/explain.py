@@ -2,46 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated
 
 import typer
 
-from facegen.cli.options import (
-    FaceName,
-    Intensity,
-    Json,
-    PersonName,
-    Quiet,
-    What,
-    columns,
-    print_json,
-    read_what,
-)
+from facegen.cli.options import FaceName, Intensity, Json, PersonName, Quiet, What, print_json, read_what
 
-if TYPE_CHECKING:
-    from facegen.facs.expressions import Resolution
-    from facegen.facs.tables import UnitTable
-
-SHOWN = 12
-"""Feature points listed unless all are asked for."""
-
-Full = Annotated[bool, typer.Option("--all", help=f"List all feature points, not only {SHOWN}.")]
-
-# Key of a deformation -> (words for a positive number, words for a negative one, unit).
-_WORDS = {
-    "jaw.open": ("opens by", "closes by", "degrees"),
-    "jaw.side": ("goes to the subject's left by", "goes to the subject's right by", "units"),
-    "jaw.forward": ("comes forward by", "goes back by", "units"),
-    "head.yaw": ("turns to the subject's left by", "turns to the subject's right by", "degrees"),
-    "head.pitch": ("chin lifts by", "chin sinks by", "degrees"),
-    "head.roll": ("tilts to the subject's left by", "tilts to the subject's right by", "degrees"),
-    "head.forward": ("comes forward by", "draws back by", "units"),
-    "eyes.yaw": ("turns to the subject's left by", "turns to the subject's right by", "degrees"),
-    "eyes.pitch": ("looks up by", "looks down by", "degrees"),
-    "lids.upper": ("lowers by", "rises by", "of the open eye"),
-    "lids.lower": ("rises by", "sinks by", "of the open eye"),
-}
+Full = Annotated[bool, typer.Option("--all", help="List all feature points, not only those that move most.")]
 
 
 def explain(what: What, face: FaceName = "akimoto", person: PersonName = None, intensity: Intensity = 1.0,
@@ -51,123 +18,13 @@ def explain(what: What, face: FaceName = "akimoto", person: PersonName = None, i
     The chain is name -> action units -> deformation data, with its numbers.
     """
     meaning = read_what(what, person=person, intensity=intensity, quiet=quiet, face=face)
-    data = _gather(meaning, face) | {"person": person, "intensity": intensity}
+
+    from facegen.face.chain import chain, chain_lines
+    from facegen.face.face import load_face
+
+    data = chain(meaning, load_face(face), person) | {"face": face, "intensity": intensity}
     if json:
         print_json(data)
         return
-    for line in _lines(data, full):
+    for line in chain_lines(data, full=full, hint=" (--all lists all)"):
         print(line)
-
-
-def _gather(meaning: Resolution, face: str) -> dict[str, Any]:
-    """Return the whole chain as plain data."""
-    from facegen.face.face import load_face
-    from facegen.facs.tables import load_units
-
-    table, rig, one = load_units(), load_face(face), meaning.expression
-    moved: dict[str, Any] = {"millimetres": {}}
-    if hasattr(rig, "shape_weights"):       # an avatar is moved by its blendshapes, not by feature points
-        moved["shapes"] = {name: round(weight, 6) for name, weight in rig.shape_weights(meaning).items()}
-    else:
-        controls = rig.controls(meaning.deformation, *meaning.more, strict=not meaning.units)
-        moved["millimetres"] = {name: [round(float(c), 3) + 0.0 for c in vector] for name, vector
-                                in zip(rig.feature_points, controls.vectors, strict=True) if vector.any()}
-    letters = {weight: letter for letter, weight in table.catalogue.letters.items()}
-    units = [{"code": code, "name": unit.name, "weight": weight, "letter": letters.get(weight),
-              "effect": unit.effect, "muscles": list(unit.muscles)}
-             for code, weight in meaning.units.items() for unit in [table.catalogue.unit_of(code)]]
-    own = [name for name in table.coefficients(meaning.units) if name in meaning.own]
-    return {
-        "what": str(meaning.what), "kind": meaning.kind, "name": meaning.name,
-        "about": one.about if one else None, "source": meaning.source, "units": units,
-        "combinations": list(_combinations(table, meaning.units)),
-        "coefficients": {name: round(value, 6) for name, value in table.coefficients(meaning.units).items()},
-        "own": own, "deformation": meaning.deformation.as_dict(), "face": face, **moved,
-        "warnings": list(meaning.warnings),
-    }
-
-
-def _combinations(table: UnitTable, units: Mapping[str, float]) -> Iterator[dict[str, Any]]:
-    """Yield the declared combinations, and the limits, that change something here."""
-    from facegen.facs.rules import coefficients
-
-    atoms = table.catalogue.expand(units)
-    for rule in table.rules:
-        if coefficients(table.catalogue, (rule,), (), atoms) != atoms:
-            yield {"units": list(rule.when), "why": rule.why}
-    for limit in table.limits:
-        if coefficients(table.catalogue, (), (limit,), atoms) != atoms:
-            active = {atom.lstrip("LRTB") for atom in atoms}
-            yield {"units": [number for number in limit.units if number in active], "why": limit.why}
-
-
-def _lines(data: Mapping[str, Any], full: bool) -> Iterator[str]:
-    """Yield the chain as text."""
-    about = f": {data['about']}" if data["about"] else ""
-    yield f"{data['name']}{about}"
-    if data["source"]:
-        yield f"  {data['source']}"
-    if data["kind"] != "deformation":
-        yield ""
-        yield "Action units (weight 0 to 1; letters A to E are the FACS intensities)"
-        rows = [(f"  {u['code']}", f"{u['letter'] or ' '} {u['weight']:.3g}", u["name"], u["effect"])
-                for u in data["units"]]
-        yield from columns(rows) if rows else ["  none: the face at rest"]
-    if data["combinations"]:
-        yield ""
-        yield "Combinations that do not simply add"
-        for one in data["combinations"]:
-            yield f"  {' with '.join(one['units'])}: {one['why']}"
-        used = ", ".join(f"{name} {value:.3g}" for name, value in data["coefficients"].items())
-        yield f"  weights after that: {used}"
-    if data["own"]:
-        yield ""
-        yield f"Units that {data['person']} moves otherwise than the common table: {', '.join(data['own'])}"
-    yield ""
-    yield from _movements(data, full)
-
-
-def _movements(data: Mapping[str, Any], full: bool) -> Iterator[str]:
-    """Yield the deformation data as text."""
-    raw = data["deformation"]
-    yield f"Deformation data, on the face {data['face']} (left and right are the subject's)"
-    rows = []
-    for kind in ("jaw", "head", "eyes", "lids"):
-        for key, value in raw.get(kind, {}).items():
-            stem, _, side = key.partition("_")
-            more, less, unit = _WORDS[f"{kind}.{stem}"]
-            who = {"eyes": "eye", "lids": f"{stem} lid"}.get(kind, kind)
-            who = {"L": "left ", "R": "right ", "": ""}[side] + who
-            unit = {"units": {"face": "of the face's own measure", "millimetre": "mm",
-                              "paper": "half head heights"}[raw["units"]]}.get(unit, unit)
-            amount = f"{abs(value) * 100:.0f} %" if kind == "lids" else f"{abs(value):.3g}"
-            rows.append((f"  {who}", f"{more if value > 0 else less} {amount} {unit}"))
-    if raw.get("folds"):
-        rows.append(("  folds", ", ".join(f"{name} {value:.2g}" for name, value in raw["folds"].items())))
-    yield from columns(rows)
-    if "shapes" in data:
-        yield f"  blendshapes of {data['face']}" + (":" if data["shapes"] else ": none, nothing moves")
-        yield from columns([(f"    {name}", f"{weight:.3g}") for name, weight in data["shapes"].items()])
-        return
-    points = sorted(data["millimetres"].items(), key=lambda item: -_length(item[1]))
-    if points:
-        shown = points if full else points[:SHOWN]
-        more = "" if len(shown) == len(points) else f"; the {SHOWN} that move most (--all lists all)"
-        yield f"  {len(points)} feature points move{more}:"
-        yield from columns([(f"    {name}", f"{_length(vector):5.1f} mm", _direction(name, vector))
-                            for name, vector in shown])
-    elif not rows:
-        yield "  nothing moves"
-
-
-def _length(vector: list[float]) -> float:
-    return sum(c * c for c in vector) ** 0.5
-
-
-def _direction(name: str, vector: list[float]) -> str:
-    """Return a movement in words, the largest part first; under a tenth of a millimetre is left out."""
-    side = {"_L": ("outward", "inward"), "_R": ("inward", "outward")}.get(name[-2:], ("left", "right"))
-    ways = (side, ("up", "down"), ("forward", "back"))
-    words = [(abs(c), f"{abs(c):.1f} {way[0] if c > 0 else way[1]}")
-             for c, way in zip(vector, ways, strict=True) if abs(c) >= 0.1]
-    return ", ".join(word for _, word in sorted(words, reverse=True))

@@ -80,6 +80,11 @@ def gallery(output: Folder = None, face: FaceName = "akimoto", person: PersonNam
             save_image(contact_sheet(pictures, labels, sheet.columns), folder / f"{sheet.name}.{format}")
 
 
+# Because FACS sorts units so, the cheek raiser among the eyes' (it is their outer sphincter).
+_FACS_PARTS = {"brows": "upper face", "eyes": "upper face", "nose": "lower face", "cheeks": "lower face",
+               "mouth": "lower face"}
+
+
 def _sheets(person: str | None) -> Iterator[Sheet]:
     """Yield every sheet."""
     from facegen.facs.expression_table import load_expressions, load_person
@@ -94,7 +99,7 @@ def _sheets(person: str | None) -> Iterator[Sheet]:
     regions: dict[str, list[Picture]] = {}
     for unit in load_catalogue().units.values():
         codes = unit.codes if unit.sides == "direction" or unit.variants else (unit.number,)
-        place = unit.region if unit.region in ("upper face", "lower face") else "jaw head eyes"
+        place = _FACS_PARTS.get(unit.region, "jaw head eyes") if unit.number != "6" else "upper face"
         regions.setdefault(place, []).extend(
             Picture(f"{code}E", f"{code} {unit.name.lower()}") for code in codes)
     for place, pictures in regions.items():

@@ -7,7 +7,7 @@ from typing import Annotated, Any
 
 import typer
 
-from facegen.cli.options import Json, PersonName, columns, print_json
+from facegen.cli.options import Json, PersonName, print_json
 
 ShapeSet = Annotated[str, typer.Option("--set", metavar="SET", help="arkit, visemes, vrm, units, expressions or all.")]
 
@@ -19,6 +19,8 @@ def _show(rows: list[dict[str, Any]], lines: Iterable[tuple[str, ...]], json: bo
     if json:
         print_json(rows)
         return
+    from facegen.fileio.columns import columns
+
     for line in columns(lines):
         print(line)
 
@@ -46,8 +48,8 @@ def units(json: Json = False) -> None:
     """FACS action units: code, name, what it does."""
     from facegen.facs.units import load_catalogue
 
-    rows = [{"number": unit.number, "codes": list(unit.codes), "name": unit.name, "effect": unit.effect,
-             "muscles": list(unit.muscles), "region": unit.region, "source": unit.source}
+    rows = [{"number": unit.number, "codes": list(unit.codes), "name": unit.name, "plain": unit.plain,
+             "effect": unit.effect, "muscles": list(unit.muscles), "region": unit.region, "source": unit.source}
             for unit in load_catalogue().units.values()]
     _show(rows, [(" ".join(row["codes"]), row["name"], row["effect"]) for row in rows], json)
 

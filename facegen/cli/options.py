@@ -114,12 +114,3 @@ def progress(title: str, total: int, *, quiet: bool) -> Iterator[Callable[[], No
                   console=Console(stderr=True), transient=True) as bar:
         task = bar.add_task(title, total=total)
         yield lambda: bar.advance(task)
-
-
-def columns(rows: Iterable[tuple[str, ...]]) -> Iterator[str]:
-    """Yield the rows as lines whose columns are aligned; the last one is as long as it is."""
-    rows = list(rows)
-    widths = [max(map(len, column)) for column in zip(*(row[:-1] for row in rows), strict=True)]
-    for row in rows:
-        cells = [cell.ljust(width) for cell, width in zip(row[:-1], widths, strict=True)]
-        yield "  ".join([*cells, row[-1]]).rstrip()

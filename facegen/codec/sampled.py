@@ -8,7 +8,7 @@ from facegen.animation.clip import Clip
 from facegen.animation.performance import Performance
 from facegen.facs.tables import load_units
 
-_ANGLES = ("head", "eyes")
+_ANGLES = ("head", "gaze")
 _HEAD = ("yaw", "pitch", "roll")
 _GAZE = ("yaw_L", "pitch_L", "yaw_R", "pitch_R")
 

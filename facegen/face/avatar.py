@@ -55,6 +55,7 @@ _CLOSERS = 0.5
 _TOUCH = 1e-9           # rounding of a sum that is one
 _MOUTH_WIDTH = 44.8     # mm, of the base face: what lengths of raw data are fractions of, where no landmarks tell
 _WIDEST = "27"          # the unit that opens the jaw as far as it goes
+_BEHIND_LIDS = 0.45      # of the width of an eye: where it turns, behind its corners
 _KEPT = 256             # poses whose weights are remembered
 
 
@@ -308,6 +309,24 @@ class AvatarFace:
     def neck(self) -> Array:
         """Where the head turns (3,), mm."""
         return _PIVOT if self.notes.neck is None else self.notes.neck
+
+    @cached_property
+    def eye_centres(self) -> Array | None:
+        """Where the left and the right eye turn (2, 3), mm, as far as the file's notes tell: the middle of an eyeball,
+        else behind the middle of its corners. None where they do not."""
+        centres = []
+        for side in "LR":
+            balls = [part for part in self.notes.parts(f"eye_{side}") if part in self._mesh.parts]
+            corners = [self.notes.landmarks.get(f"eye_{end}_{side}") for end in ("inner", "outer")]
+            if balls:
+                ball = self._mesh.vertices[self._mesh.part_vertices(balls[0])]
+                centres.append((ball.min(axis=0) + ball.max(axis=0)) / 2.0)
+            elif all(at is not None for at in corners):
+                width = float(np.linalg.norm(corners[0] - corners[1]))
+                centres.append((corners[0] + corners[1]) / 2.0 - [0.0, 0.0, _BEHIND_LIDS * width])
+            else:
+                return None
+        return np.array(centres)
 
     @cached_property
     def neck_weight(self) -> Array:

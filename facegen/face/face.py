@@ -25,7 +25,7 @@ from facegen.face.head import turn_head
 from facegen.face.landmarks import landmark_weights
 from facegen.face.loader import FINEST, FaceData, read_face
 from facegen.face.named import face_file, shipped_faces
-from facegen.facs.deformation import Deformation, weighted_sum
+from facegen.facs.deformation import UNITS, Deformation, weighted_sum
 from facegen.facs.expressions import Resolution, resolve
 from facegen.geometry.mesh import Mesh, merge
 from facegen.geometry.normals import vertex_normals
@@ -120,7 +120,7 @@ class Face:
         ``vertices`` (n, 3) of ``mesh(detail)``, such as :meth:`pose` gives. A feature point is a vertex of the cage;
         the smooth surface runs a little inside the cage, and this is the place on the surface that belongs to it.
         """
-        return _placed(self._data.point_names, self._point_weights(detail), vertices, detail)
+        return _placed(self._data.point_names, self.point_weights(detail), vertices, detail)
 
     @property
     def landmarks(self) -> tuple[str, ...]:
@@ -170,9 +170,30 @@ class Face:
         return tuple(self._data.folds)
 
     @property
+    def takes_input(self) -> NDArray[np.bool_]:
+        """Which feature points (k,) take a vector: the rest are fixed, or turn with the jaw alone."""
+        return self._data.takes_input
+
+    @property
+    def paper_names(self) -> dict[str, str]:
+        """Feature point -> its name in the paper, F1 to F15, of those that have one."""
+        names = self._data.point_names
+        return {names[row]: alias for alias, row in self._data.point_index.items() if alias != names[row]}
+
+    @property
+    def centre(self) -> Array:
+        """The centre O (3,), mm, from which vertices are projected onto their regions (section 3.1 of the paper)."""
+        return self._data.centre
+
+    @property
     def neck(self) -> Array:
         """Where the head turns (3,), mm."""
         return self._data.head_pivot
+
+    @property
+    def eye_centres(self) -> Array:
+        """Where the left and the right eye turn (2, 3), mm."""
+        return self._data.eye_centres
 
     def neck_weight(self, detail: int = 2) -> Array:
         """Return how much of the head's turn each vertex (n, 1) of ``mesh(detail)`` makes."""
@@ -219,7 +240,7 @@ class Face:
         ``strict=False`` it is passed over: a face of fifteen points takes of the common tables what it can.
         """
         if more:
-            deformation = weighted_sum([(1.0, self._in_millimetres(one)) for one in (deformation, *more)])
+            deformation = self.total(deformation, *more)
         linear = self.linear_controls(deformation, strict=strict)
         turning = [row for name in deformation.with_jaw if (row := self._point(name, strict)) is not None]
         return self.finished_controls(linear, turning)
@@ -281,7 +302,7 @@ class Face:
             return np.broadcast_to(level.neutral, (*batch, *level.neutral.shape)).copy()
         cage = self.deformer.deform(controls.vectors, controls.jaw, controls.lids)
         flat = np.moveaxis(cage.reshape(-1, *cage.shape[-2:]), 0, 1).reshape(cage.shape[-2], -1)
-        skin = np.moveaxis((level.matrix @ flat).reshape(level.matrix.shape[0], -1, 3), 1, 0)
+        skin = np.moveaxis((level.matrix @ flat).reshape(level.matrix.shape[0], flat.shape[1] // 3, 3), 1, 0)
         skin = np.ascontiguousarray(skin).reshape(*batch, -1, 3)
         if level.relief is not None:
             skin += level.relief
@@ -303,9 +324,18 @@ class Face:
         paper = d.head_half_height * np.array([1.0, 1.0, -1.0])     # half head heights, z backward
         return np.tile(paper, (len(d.point_names), 1)), paper
 
-    def _in_millimetres(self, deformation: Deformation) -> Deformation:
-        """Return the same movements of this face in millimetres; what this face lacks keeps its numbers."""
-        scale, mouth = self._lengths(deformation.units)
+    def total(self, *several: Deformation, units: str = "millimetre") -> Deformation:
+        """Return the sum of movements of this face, which may be in different units of length, in one of them."""
+        if units not in UNITS:
+            raise InputError(f"units: expected {', '.join(UNITS)}, got {units!r}{nearest(str(units), UNITS)}")
+        return weighted_sum([(1.0, self._converted(one, units)) for one in several])
+
+    def _converted(self, deformation: Deformation, units: str) -> Deformation:
+        """Return the same movements in another unit of length; what this face lacks keeps its numbers."""
+        if deformation.units == units:
+            return deformation
+        (scale, mouth), (other, other_mouth) = self._lengths(deformation.units), self._lengths(units)
+        scale, mouth = scale / other, mouth / other_mouth
         rows = self._data.point_index
         points = {name: tuple(np.asarray(vector) * scale[rows[name]]) if name in rows else vector
                   for name, vector in deformation.points.items()}
@@ -313,7 +343,7 @@ class Face:
         for part, key, axis in ((jaw, "side", 0), (jaw, "forward", 2), (head, "forward", 2)):
             if key in part:
                 part[key] *= mouth[axis]
-        return replace(deformation, points=points, jaw=jaw, head=head, units="millimetre")
+        return replace(deformation, points=points, jaw=jaw, head=head, units=units)
 
     def _point(self, name: str, strict: bool) -> int | None:
         """Return the row of a feature point that takes input, or None for one to be passed over."""
@@ -398,7 +428,7 @@ class Face:
             self._landmarks_on[detail] = landmark_weights(self._data.landmarks, mesh, detail)
         return self._landmarks_on[detail]
 
-    def _point_weights(self, detail: int) -> sparse.csr_array:
+    def point_weights(self, detail: int = 2) -> sparse.csr_array:
         """Return the weights (k, n) of the vertices of ``mesh(detail)`` that place the feature points; kept."""
         d, mesh = self._data, self.mesh(detail)
         if detail in self._points_on:

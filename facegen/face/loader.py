@@ -72,6 +72,7 @@ class FaceData:
     landmarks: Mapping[str, Landmark]
     colours: Mapping[str, tuple[float, float, float]] | None     # material -> sRGB 0..255, where not the usual ones
     relief: Array | None        # (n, 3) what the surface has beyond the smooth cage, at the finest level
+    centre: Array               # (3,) the paper's O
 
 
 def read_face(path: Path) -> FaceData:
@@ -151,8 +152,8 @@ def read_face(path: Path) -> FaceData:
             index(Entry(_integer(k), e.source, e.path)): e.number(0, 1) for k, e in entry.items()}
         if abs(sum(followers[int(key)].values()) - 1.0) > 1e-6:
             raise entry.wrong("shares that sum to one")
-    weights, rigid = region_weights(cage.vertices, np.array(places), regions, place(top["centre_O"]), sheets,
-                                    followers)
+    centre = place(top["centre_O"])
+    weights, rigid = region_weights(cage.vertices, np.array(places), regions, centre, sheets, followers)
 
     by_side = {key: top[key].fields(required=SIDES) for key in ("eyes", "lids")}
     eyes = {side: place(by_side["eyes"][side]) for side in SIDES}
@@ -232,7 +233,7 @@ def read_face(path: Path) -> FaceData:
         top["head_half_height"].number(1e-6) if "head_half_height" in top
         else float(np.ptp(cage.vertices[:, 1]) / 2),
         attachments, folds, np.array(takes_input), landmarks,
-        {name: _colour(e) for name, e in top["colours"].items()} if "colours" in top else None, relief)
+        {name: _colour(e) for name, e in top["colours"].items()} if "colours" in top else None, relief, centre)
 
 
 def _integer(key: str) -> object:

@@ -205,13 +205,18 @@ def load_deformation(path: str | Path) -> Deformation:
 
 def load_deformation_file(path: str | Path) -> tuple[Deformation, str | None]:
     """Return the deformation in a file and the source that the file names, if any."""
-    entry = Entry(read_data(path), str(path))
+    return read_deformation(read_data(path), str(path))
+
+
+def read_deformation(data: object, source: str) -> tuple[Deformation, str | None]:
+    """Return the deformation in a file's plain data, and the source that they name; ``source`` is the file."""
+    entry = Entry(data, source)
     fields = entry.fields(optional=(*KEYS, "about", "source"))
     texts = {key: fields.pop(key).text() for key in ("about", "source") if key in fields}
     if not fields:
         raise entry.fail(f"holds no deformation: give at least one of {', '.join(KEYS[1:])}")
-    data = {key: field.value for key, field in fields.items()}
-    return deformation_from_dict(data, source=str(path)), texts.get("source")
+    found = {key: field.value for key, field in fields.items()}
+    return deformation_from_dict(found, source=source), texts.get("source")
 
 
 def _checked(entry: Entry) -> dict[str, object]:

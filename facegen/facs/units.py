@@ -22,7 +22,7 @@ from facegen.facs.validate import Entry
 from facegen.facs.yamlfile import read_data
 
 SIDES = ("none", "both", "direction", "asymmetric")
-REGIONS = ("upper face", "lower face", "jaw", "tongue", "eyes", "head", "neck")
+REGIONS = ("brows", "eyes", "nose", "cheeks", "mouth", "jaw", "tongue", "neck", "head", "gaze")
 LETTERS = "ABCDE"
 DEFAULT_LETTER = "D"  # of a unit typed without intensity: plain to see, short of the extreme
 
@@ -33,10 +33,11 @@ _CODE = re.compile(r"([LRTB]?)(0|[1-9][0-9]?)", re.ASCII)
 class Unit:
     """One action unit. ``sides``: none; both (scored left and right); direction (a side must be said, like
     L30); asymmetric (one-sided by nature, like a turn of the head). ``variants``: ("T", "B") where lips are
-    scored apart."""
+    scored apart. ``plain``: what is seen, for people who do not know the name. ``region``: where, of `REGIONS`."""
 
     number: str
     name: str
+    plain: str
     effect: str
     muscles: tuple[str, ...]
     region: str
@@ -196,7 +197,7 @@ def _unit(number: str, entry: Entry, sources: Mapping[str, str]) -> Unit:
     if not _CODE.fullmatch(number) or number == "0" or not number.isdigit():
         raise entry.fail(f"a unit's key is its number, 1 to 99, got '{number}'")
     fields = entry.fields(required=("name", "effect", "muscles", "region", "source"),
-                          optional=("sides", "variants", "parts_lips"))
+                          optional=("plain", "sides", "variants", "parts_lips"))
     sides = "none"
     if "sides" in fields:
         value = fields["sides"].value
@@ -205,7 +206,9 @@ def _unit(number: str, entry: Entry, sources: Mapping[str, str]) -> Unit:
     variants = fields["variants"].texts() if "variants" in fields else ()
     if variants and (variants != ("T", "B") or sides != "none"):
         raise fields["variants"].fail("expected [T, B] on a unit without sides")
-    return Unit(number, fields["name"].text(), fields["effect"].text(), fields["muscles"].texts(),
+    name = fields["name"].text()
+    return Unit(number, name, fields["plain"].text() if "plain" in fields else name, fields["effect"].text(),
+                fields["muscles"].texts(),
                 region=fields["region"].choice(REGIONS, "region"),
                 source=sources[fields["source"].choice(sources, "source")], sides=sides, variants=variants,
                 parts_lips=fields["parts_lips"].flag() if "parts_lips" in fields else False)

@@ -48,7 +48,7 @@ def unit_atoms(wanted: Sequence[str] | None = None, *, dense: bool = True) -> tu
     if wanted is None:
         out = (*ALIKE, *(() if dense else RARE))
         return tuple(atom for atom in catalogue.atoms if not is_head(atom)
-                     and catalogue.unit_of(atom).region != "eyes" and catalogue.unit_of(atom).number not in out)
+                     and catalogue.unit_of(atom).region != "gaze" and catalogue.unit_of(atom).number not in out)
     found = {atom for code in wanted for atom in catalogue.expand({member_of(code) or code.removeprefix("AU"): 1.0})}
     return tuple(atom for atom in catalogue.atoms if atom in found)
 

@@ -8,6 +8,7 @@ from collections.abc import Callable
 from typing import Any
 
 from facegen.studio.desk import Desk
+from facegen.studio.files import Shelf
 from facegen.studio.page import Page, Panel
 from facegen.studio.server import StudioServer
 from facegen.studio.stage import set_scene
@@ -16,15 +17,15 @@ from facegen.studio.stage import set_scene
 class Studio:
     """A running studio. ``server``; ``desk``; ``pages``: those open, by viser's number of the client.
 
-    folder: where works are kept. panels: title of the tab -> what makes it; the usual ones by default. The rest is for
-    the `StudioServer`. A context manager.
+    folder: where works are kept. shelf: what else pages may open. panels: title of the tab -> what makes it; the usual
+    ones by default. The rest is for the `StudioServer`. A context manager.
     """
 
     def __init__(self, folder: str | os.PathLike[str], *, panels: dict[str, Callable[[Page], Panel]] | None = None,
-                 **options: Any) -> None:
+                 shelf: Shelf | None = None, **options: Any) -> None:
         if panels is None:
             from facegen.studio.panels import PANELS as panels
-        self.desk = Desk(folder)
+        self.desk = Desk(folder, shelf)
         self.pages: dict[int, Page] = {}
         self._panels, self._lock = panels, threading.Lock()
         self.server = StudioServer(on_page=self._came, on_page_closed=self._went, **options)

@@ -14,6 +14,7 @@ from facegen.face.face import load_face
 from facegen.face.named import face_names
 from facegen.facs.expression_table import Person, load_person, people
 from facegen.fileio.textfile import make_folder
+from facegen.studio.files import Shelf
 from facegen.studio.store import Store
 
 FACES = "faces"
@@ -32,11 +33,11 @@ _FILE = re.compile(r"[\w][\w -]{0,59}\.yaml")
 class Desk:
     """Safe to call from several threads; faces are shared, so nobody may change them.
 
-    folder: where works are kept. ``store``: the works.
+    folder: where works are kept. ``store``: the works. ``shelf``: files of this machine that pages may open.
     """
 
-    def __init__(self, folder: str | os.PathLike[str]) -> None:
-        self.store = Store(make_folder(folder))
+    def __init__(self, folder: str | os.PathLike[str], shelf: Shelf | None = None) -> None:
+        self.store, self.shelf = Store(make_folder(folder)), shelf or Shelf()
         self._faces: dict[Path | str, Any] = {}
         self._locks: dict[Path | str, threading.Lock] = {}
         self._lock = threading.Lock()

@@ -70,6 +70,11 @@ class Figure:
         for handle, _ in self._handles:
             handle.visible = shown
 
+    def fade(self, opacity: float | None) -> None:
+        """Let what is inside be seen, or with None no more."""
+        for handle, _ in self._handles:
+            handle.opacity = opacity
+
     def remove(self) -> None:
         """Take it from the scene."""
         for handle, _ in self._handles:

@@ -15,9 +15,12 @@ from dataclasses import replace
 from typing import Any, Protocol
 
 from facegen.errors import FacegenError
+from facegen.facs.expression_table import Person
+from facegen.facs.expressions import Resolution
 from facegen.studio.desk import Desk
 from facegen.studio.history import History
 from facegen.studio.stage import Stage
+from facegen.studio.steps import Steps
 from facegen.studio.work import FaceWork, Work
 
 log = logging.getLogger("facegen.studio")
@@ -60,6 +63,7 @@ class Page:
             self.say(told, "Your work could not be read", colour="red", closes=None)
         with self.lock:
             self._set_face(work.face)
+            self._steps = Steps(self)
             tabs = client.gui.add_tab_group()
             for title, make in panels.items():
                 with tabs.add_tab(title):
@@ -119,6 +123,7 @@ class Page:
         self._refresh()
 
     def _refresh(self) -> None:
+        self._steps.refresh(self.history)
         for panel in self._panels:
             panel.refresh(self.work)
 
@@ -140,12 +145,20 @@ class Page:
     def show_face(self) -> None:
         """Show the work's expression on the page's face; what a clip showed there ends."""
         rig, face = self.rig, self.work.face
+        person = self.person()
+        self.stage.request(FACE, lambda: rig.pose(face.meaning(person, rig)))
+
+    def person(self) -> Person | None:
+        """Return the person of the page's face as their file is now; nobody, with a notice, if it will not do."""
         try:
-            person = self.desk.person(face.person, self.name)
+            return self.desk.person(self.work.face.person, self.name)
         except FacegenError as error:           # a person whose table went away or is broken
             self.say(f"{error}; the common table is used instead.", "That person is gone", colour="red")
-            person = None
-        self.stage.request(FACE, lambda: rig.pose(face.meaning(person)))
+            return None
+
+    def meaning(self) -> Resolution:
+        """Return what the page's face shows."""
+        return self.work.face.meaning(self.person(), self.rig)
 
     # -- the person ---------------------------------------------------------------------------------------------
     def calls(self, function: Callable[..., None]) -> Callable[[Any], None]:

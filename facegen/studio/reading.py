@@ -25,7 +25,10 @@ from facegen.studio.limits import MEBIBYTE, Limits
 
 _CPU_SIGNAL = 24            # SIGXCPU, which ends a process after its time
 _START = 10.0               # seconds that a process may need until it reads, on a machine that is busy
-_PROGRAM = "import sys; sys.path.append(sys.argv[1]); from facegen.studio.reading import answer; answer()"
+_PROGRAM = """import sys
+sys.path.append(sys.argv[1])
+from facegen.studio import reading
+reading.answer()"""
 # What the answer of the other process may be made of: it read a stranger's file, and is not trusted more than that.
 _CLASSES = {("pathlib", "PosixPath"), ("pathlib", "WindowsPath"), ("pathlib", "PurePosixPath"), ("builtins", "set"),
             ("numpy", "ndarray"), ("numpy", "dtype"), ("numpy.core.multiarray", "_reconstruct"),
@@ -56,7 +59,7 @@ def read_data_safely(path: str | os.PathLike[str], limits: Limits | None = None)
 
 def _asked(what: str, path: Path, limits: Limits) -> bytes:
     """Have another process read a file; return its answer, or raise the error that it tells of."""
-    wish = json.dumps({"what": what, "path": str(path.absolute()), "triangles": limits.triangles,
+    wish = json.dumps({"what": what, "path": str(path), "triangles": limits.triangles,
                        "seconds": limits.read_seconds, "bytes": limits.read_bytes})
     environment = {**os.environ, "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "PYTHONWARNINGS": "ignore",
                    "PYTHONDONTWRITEBYTECODE": "1"}
@@ -77,12 +80,12 @@ def _asked(what: str, path: Path, limits: Limits) -> bytes:
         raise kind(told["text"])
     if done.returncode == -_CPU_SIGNAL:
         raise _too_slow(path, limits)
-    raise FileError(f"{path.name}: cannot be read: it needs more than {limits.read_bytes // MEBIBYTE} MiB, or makes "
+    raise FileError(f"{path}: cannot be read: it needs more than {limits.read_bytes // MEBIBYTE} MiB, or makes "
                     "its reader fail")
 
 
 def _too_slow(path: Path, limits: Limits) -> FileError:
-    return FileError(f"{path.name}: cannot be read within {limits.read_seconds:.0f} s")
+    return FileError(f"{path}: cannot be read within {limits.read_seconds:.0f} s")
 
 
 class _Answers(pickle.Unpickler):
@@ -118,7 +121,7 @@ def answer() -> None:
         if isinstance(error, FacegenError):
             found = _error(type(error).__name__, error)
         else:
-            found = _error("FileError", FileError(f"{path.name}: cannot be read ({type(error).__name__})"))
+            found = _error("FileError", FileError(f"{path}: cannot be read ({type(error).__name__})"))
     out.write(found)
     out.flush()
 
@@ -140,7 +143,7 @@ def _avatar(path: Path, most: int) -> bytes:
 
 
 def _too_many(path: Path, count: int, most: int) -> FileError:
-    return FileError(f"{path.name}: has {count:,} triangles; the studio opens avatars of up to {most:,}. Simplify it, "
+    return FileError(f"{path}: has {count:,} triangles; the studio opens avatars of up to {most:,}. Simplify it, "
                      "or use facegen's commands")
 
 
@@ -159,5 +162,6 @@ def _bound(seconds: float, size: int) -> None:
     for name, bound in (("RLIMIT_AS", size), ("RLIMIT_CPU", math.ceil(seconds)), ("RLIMIT_CORE", 0),
                         ("RLIMIT_FSIZE", 0), ("RLIMIT_NPROC", 0)):
         if hasattr(resource, name):
+            hard = bound + (name == "RLIMIT_CPU")       # the first bound has a signal of its own, the second kills
             with contextlib.suppress(ValueError, OSError):      # a lower bound stands already
-                resource.setrlimit(getattr(resource, name), (bound, bound))
+                resource.setrlimit(getattr(resource, name), (bound, hard))

@@ -11,7 +11,8 @@ from dataclasses import asdict, dataclass, field, fields, replace
 from typing import Any, Self
 
 from facegen.errors import InputError, TableError
-from facegen.facs.deformation import Deformation, deformation_from_dict
+from facegen.face.gaze import look_at
+from facegen.facs.deformation import Deformation, deformation_from_dict, weighted_sum
 from facegen.facs.expression_table import Person
 from facegen.facs.expressions import Resolution, resolve
 from facegen.facs.notation import canonical
@@ -23,6 +24,9 @@ VERSION = 1
 
 _FORM = "facegen_studio"
 
+FARTHEST = 1e6
+"""Millimetres to a point that is looked at."""
+
 
 @dataclass(frozen=True)
 class FaceWork:
@@ -32,7 +36,8 @@ class FaceWork:
     person's name or that of a file of the work's own (`Desk.people`), or None. units:
     unit code -> weight 0..1, as a script gives them. blend: expression -> share 0..1 that ``units`` came from; empty as
     soon as a unit is changed by hand. raw: movements on top, the form of a deformation file (docs/files.md). intensity:
-    0..1, of units and raw data alike.
+    0..1, of units and raw data alike. gaze: {"x", "y", "z"}, mm, of the point at which the eyes look whatever else
+    moves them, or nothing. apart: whether the sliders of left and right are apart.
     """
 
     rig: str = "akimoto"
@@ -41,6 +46,8 @@ class FaceWork:
     blend: Mapping[str, float] = field(default_factory=dict)
     raw: Mapping[str, Any] = field(default_factory=dict)
     intensity: float = 1.0
+    gaze: Mapping[str, float] = field(default_factory=dict)
+    apart: bool = False
 
     @property
     def script(self) -> str:
@@ -52,18 +59,35 @@ class FaceWork:
         """The raw movements, intensity not applied."""
         return deformation_from_dict(self.raw) if self.raw else Deformation()
 
-    def meaning(self, person: Person | None = None) -> Resolution:
-        """Return what a rig is to show. person: who ``person`` is (`Desk.person`); their units move their way."""
+    def meaning(self, person: Person | None = None, rig: Any = None) -> Resolution:
+        """Return what a rig is to show. person: who ``person`` is (`Desk.person`); their units move their way. rig: the
+        face, whose eyes look at the point that ``gaze`` says; without one they do not."""
         found = resolve(dict(self.units) or "neutral", person=person, intensity=self.intensity)
         raw = self.deformation * self.intensity
+        if self.gaze and rig is not None:
+            return _gazing(found, raw, self.gaze, rig)
         return replace(found, more=(*found.more, raw)) if raw else found
 
     def checked(self) -> Self:
         """Return itself, or raise InputError for what no face can show."""
         for name, share in self.blend.items():
             Entry(share, "face", f"blend.{name}").number(0.0, 1.0)
+        if self.gaze:
+            point = Entry(self.gaze, "face", "gaze").fields(required=("x", "y", "z"))
+            for entry in point.values():
+                entry.number(-FARTHEST, FARTHEST)
         self.meaning()
         return self
+
+
+def _gazing(found: Resolution, raw: Deformation, gaze: Mapping[str, float], rig: Any) -> Resolution:
+    """Return the meaning with other eyes: they look at a point, whatever units and raw data say of them."""
+    units, raw = replace(found.deformation, eyes={}), replace(raw, eyes={})
+    head = weighted_sum([(1.0, Deformation(head=one.head)) for one in (units, raw)]).head
+    turned = [head.get(key, 0.0) for key in ("yaw", "pitch", "roll")]
+    eyes = look_at(rig, [gaze[axis] for axis in "xyz"], head=[*turned, 0.0])
+    more = (one for one in (raw, Deformation(eyes=eyes)) if one)
+    return replace(found, deformation=units, more=(*found.more, *more))
 
 
 @dataclass(frozen=True)

@@ -159,7 +159,8 @@ def test_a_batch_draws_the_person_and_knows_when_the_person_changed(tmp_path):
 
     def batch(text):
         (tmp_path / "ada.yaml").write_text("about: A.\nsource: s\nunits:\n" + text)
-        (tmp_path / "jobs.yaml").write_text("people: [ada.yaml]\nposes: [12E, 4E]\nsizes: [64]\ndetail: 0\nrenderer: numpy\n")
+        (tmp_path / "jobs.yaml").write_text("people: [ada.yaml]\nposes: [12E, 4E]\nsizes: [64]\n"
+                                            "detail: 0\nrenderer: soft\n")
         for folder in ("images", "labels"):
             (tmp_path / folder).mkdir(exist_ok=True)
         made = read_batch(tmp_path / "jobs.yaml")

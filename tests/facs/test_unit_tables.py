@@ -174,9 +174,9 @@ UNITS = """
 sources: {s: a source}
 intensity: {A: 0.1, B: 0.2, C: 0.5, D: 0.8, E: 1.0}
 units:
-  "12": {name: Twelve, effect: e, muscles: [m], region: lower face, sides: true, source: s}
-  "17": {name: Seventeen, effect: e, muscles: [m], region: lower face, source: s}
-  "23": {name: Twentythree, effect: e, muscles: [m], region: lower face, variants: [T, B], source: s}
+  "12": {name: Twelve, effect: e, muscles: [m], region: mouth, sides: true, source: s}
+  "17": {name: Seventeen, effect: e, muscles: [m], region: mouth, source: s}
+  "23": {name: Twentythree, effect: e, muscles: [m], region: mouth, variants: [T, B], source: s}
   "30": {name: Thirty, effect: e, muscles: [m], region: jaw, sides: direction, source: s}
   "51": {name: Fiftyone, effect: e, muscles: [], region: head, sides: asymmetric, source: s}
 """

@@ -20,7 +20,7 @@ class Handle:
         self._calls.append(call)
         return call
 
-    on_click = on_upload = on_drag = on_drag_start = on_drag_end = on_drag_update = on_update
+    on_trigger = on_click = on_upload = on_drag = on_drag_start = on_drag_end = on_drag_update = on_update
 
     def enter(self, value: Any) -> None:
         """Do as a person who enters a value."""

@@ -1,0 +1,117 @@
+"""Small pictures of expressions on a face, drawn by our own renderer when they are asked for, and kept on disk.
+
+A picture is known by what is in it: the face's own shape and movements, and the units. So a changed table, another
+version or another person makes another, and nothing is ever stale.
+"""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import io
+import os
+import threading
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from PIL import Image
+
+from facegen.errors import FacegenError
+from facegen.facs.notation import canonical
+from facegen.fileio.textfile import make_folder, whole_file
+
+SIZE = 88
+"""Pixels of a thumbnail: four stand beside each other in a panel, sharp on a fine screen too."""
+
+# What a face shows of itself in its digest: every part of it moves.
+_PROBE = "1D+4C+9C+12E+20C+26E+43B+63B"
+_VIEW = (12.0, 4.0)
+_DETAIL = 1
+_BACKGROUND = (236, 236, 236)
+
+
+def face_digest(rig: Any) -> str:
+    """Return what tells a face from any other: its shape, colours, and how it moves."""
+    mesh = rig.mesh(_DETAIL)
+    found = hashlib.sha256(f"{rig.name} {SIZE} {_VIEW} {sorted((rig.colours or {}).items())}".encode())
+    for part in (mesh.vertices, mesh.faces, mesh.face_materials, rig.pose(_PROBE, detail=_DETAIL)):
+        found.update(np.ascontiguousarray(part).tobytes())
+    return found.hexdigest()[:16]
+
+
+class Thumbnails:
+    """Pictures below a folder. `ask` for them; a thread draws the latest asked for."""
+
+    def __init__(self, folder: str | os.PathLike[str], fault: Callable[[Exception], None]) -> None:
+        self._folder, self._fault = Path(folder), fault
+        self._changed = threading.Condition()
+        self._asked: tuple[Any, list[tuple[str, Mapping[str, float]]], Callable[[str, str], None]] | None = None
+        self._closed = self._busy = False
+        self._thread: threading.Thread | None = None
+
+    def ask(self, rig: Any, wanted: Mapping[str, Mapping[str, float]], ready: Callable[[str, str], None]) -> None:
+        """Have ``ready(name, data_url)`` called for every name -> units, in order; what was asked before is dropped."""
+        with self._changed:
+            self._asked = rig, list(wanted.items()), ready
+            self._changed.notify_all()
+            if self._thread is None:
+                self._thread = threading.Thread(target=self._run, name="facegen studio thumbnails", daemon=True)
+                self._thread.start()
+
+    def settle(self, timeout: float = 60.0) -> bool:
+        """Wait until all that was asked for is there."""
+        with self._changed:
+            return self._changed.wait_for(lambda: self._closed or not (self._asked or self._busy), timeout)
+
+    def close(self) -> None:
+        """End its thread."""
+        with self._changed:
+            self._closed = True
+            self._changed.notify_all()
+
+    def _run(self) -> None:
+        while True:
+            with self._changed:
+                self._busy = False
+                self._changed.notify_all()
+                self._changed.wait_for(lambda: self._asked or self._closed)
+                if self._closed:
+                    return
+                (rig, wanted, ready), self._asked, self._busy = self._asked, None, True
+            try:
+                self._draw(rig, wanted, ready)
+            except Exception as error:
+                self._fault(error)
+
+    def _draw(self, rig: Any, wanted: list[tuple[str, Mapping[str, float]]], ready: Callable[[str, str], None]) -> None:
+        folder, renderer = self._folder / face_digest(rig), None
+        for name, units in wanted:
+            if self._closed or self._asked:
+                return
+            script = canonical(units)
+            path = folder / f"{hashlib.sha256(script.encode()).hexdigest()[:24]}.jpg"
+            try:
+                picture = path.read_bytes()
+            except OSError:
+                if renderer is None:
+                    from facegen.render.render import Renderer
+
+                    renderer = Renderer(rig, size=SIZE, view=_VIEW, detail=_DETAIL, occlusion="neutral", threads=1,
+                                        background=_BACKGROUND)
+                pixels = renderer.draw(rig.pose(units or "neutral", detail=_DETAIL))
+                picture = self._keep(pixels, path)
+            ready(name, "data:image/jpeg;base64," + base64.b64encode(picture).decode())
+
+    def _keep(self, pixels: Any, path: Path) -> bytes:
+        """Return a picture as JPEG, kept if the disk lets us."""
+        buffer = io.BytesIO()
+        Image.fromarray(pixels[..., :3]).save(buffer, "JPEG", quality=85)
+        try:
+            make_folder(path.parent)
+            with whole_file(path) as draft:
+                draft.write_bytes(buffer.getvalue())
+        except FacegenError:
+            pass                        # a full disk costs time, not the picture
+        return buffer.getvalue()

@@ -1,0 +1,188 @@
+"""Hostile files: none hangs, none takes the memory, none runs anything, and each is told of."""
+
+from __future__ import annotations
+
+import io
+import json
+import pickle
+import struct
+import sys
+import time
+
+import numpy as np
+import pytest
+
+from facegen.errors import FileError, TableError
+from facegen.fileio.avatar import load_avatar
+from facegen.geometry.mesh import Mesh
+from facegen.studio import reading
+from facegen.studio.counting import triangles
+from facegen.studio.limits import Limits
+from facegen.studio.reading import read_avatar_safely, read_data_safely
+from facegen.transfer.rig import avatar_files, avatar_names
+
+LIMITS = Limits(read_seconds=20.0, read_bytes=1 << 30)
+
+
+def _glb(scene: dict, binary: bytes = b"", *, length: int | None = None) -> bytes:
+    text = json.dumps(scene).encode()
+    text += b" " * (-len(text) % 4)
+    binary += bytes(-len(binary) % 4)
+    body = struct.pack("<II", len(text), 0x4E4F534A) + text + struct.pack("<II", len(binary), 0x004E4942) + binary
+    return struct.pack("<4sII", b"glTF", 2, 12 + len(body) if length is None else length) + body
+
+
+def _scene(count: int, *, size: int = 36, nodes: int = 1) -> dict:
+    return {"asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": list(range(nodes))}],
+            "nodes": [{"mesh": 0} for _ in range(nodes)], "meshes": [{"primitives": [{"attributes": {"POSITION": 0}}]}],
+            "accessors": [{"bufferView": 0, "componentType": 5126, "count": count, "type": "VEC3"}],
+            "bufferViews": [{"buffer": 0, "byteLength": size}], "buffers": [{"byteLength": size}]}
+
+
+@pytest.fixture(scope="module")
+def shipped():
+    return avatar_files("cat", None)[0]
+
+
+def test_a_good_file_is_read_as_ever(shipped):
+    found, known = read_avatar_safely(shipped), load_avatar(shipped)
+    np.testing.assert_array_equal(found.mesh.vertices, known.mesh.vertices)
+    np.testing.assert_array_equal(found.mesh.faces, known.mesh.faces)
+    assert (found.path, found.kind, found.digest) == (known.path, known.kind, known.digest)
+    assert found.colours == known.colours
+    assert list(found.mesh.parts) == list(known.mesh.parts)
+
+
+def test_every_kind_is_read(tmp_path, shipped):
+    from facegen.fileio.avatar import save_avatar
+
+    known = load_avatar(shipped)
+    save_avatar(known, tmp_path / "cat.glb", {"up": np.ones_like(known.mesh.vertices)})
+    vertices = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0.0]])
+    (tmp_path / "one.ply").write_text("ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\n"
+                                      "property float z\nelement face 1\nproperty list uchar int vertex_indices\n"
+                                      "end_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n")
+    found = read_avatar_safely(tmp_path / "cat.glb")
+    np.testing.assert_allclose(found.shapes["up"], 1.0, atol=1e-6)
+    found = reading._Answers(io.BytesIO(reading._avatar(tmp_path / "one.ply", 9))).load()
+    np.testing.assert_array_equal(found.mesh.vertices, vertices)
+
+
+@pytest.mark.parametrize(("name", "content"), [
+    ("a.glb", b""), ("a.glb", b"glTF"), ("a.glb", b"\x00" * 100),
+    ("a.glb", b"glTF\x02\0\0\0\xff\xff\xff\xff" + b"x" * 40), ("huge.glb", _glb(_scene(2**31))),
+    ("lies.glb", _glb(_scene(3), length=2**31)), ("a.gltf", b"[" * 100_000),
+    ("a.gltf", b'{"asset": {"version": "2.0"}, "buffers": [{"byteLength": 3, "uri": "../../../../etc/passwd"}]}'),
+    ("a.gltf", b'{"asset": {"version": "2.0"}, "buffers": [{"byteLength": 3, "uri": "file:///etc/passwd"}]}'),
+    ("a.obj", b"v a b c\nf 1 2 3"), ("a.obj", b"v 0 0 0\nf 1 2 99999999999"), ("a.obj", b"\xff\xfe" * 1000),
+    ("a.ply", b"ply\nformat binary_little_endian 1.0\nelement vertex 4000000000\nproperty float x\nend_header\n"),
+    ("a.stl", b"\0" * 80 + b"\xff\xff\xff\xff"), ("a.vrm", b"PK\x03\x04"), ("a.exe", b"MZ"),
+    ("cyclic.glb", _glb({**_scene(3), "nodes": [{"mesh": 0, "children": [1]}, {"children": [0]}]}))])
+def test_broken_files_are_told_of(tmp_path, name, content):
+    """By what the other process runs; that it is another one, costs a second each."""
+    path = tmp_path / name
+    path.write_bytes(content)
+    with pytest.raises(FileError) as told:
+        reading._avatar(path, LIMITS.triangles)
+    assert name in str(told.value)
+    assert "root:" not in str(told.value)
+    assert "\n" not in str(told.value)
+
+
+def test_triangles_are_counted_before_anything_is_made(tmp_path, monkeypatch):
+    """Behind what the files say is nothing, so that only a header can have told."""
+    (tmp_path / "a.ply").write_bytes(b"ply\nformat binary_little_endian 1.0\nelement vertex 9\nelement face 9000\nend")
+    (tmp_path / "a.stl").write_bytes(b"\0" * 80 + struct.pack("<I", 9000))
+    (tmp_path / "a.glb").write_bytes(_glb(_scene(27_000)))
+    (tmp_path / "b.glb").write_bytes(_glb(_scene(3, nodes=9000)))
+    (tmp_path / "a.obj").write_bytes(b"v 0 0 0\n" + b"f 1 1 1\n" * 9000)
+    with pytest.raises(FileError, match="9,000 triangles; the studio opens avatars of up to 8,000"):
+        read_avatar_safely(tmp_path / "a.glb", Limits(triangles=8000))
+    monkeypatch.setattr(reading, "load_avatar", lambda path: pytest.fail("it was read"))
+    for name in ("a.ply", "a.stl", "a.glb", "b.glb", "a.obj"):
+        assert triangles(tmp_path / name) == 9000
+        with pytest.raises(FileError, match="9,000 triangles; the studio opens avatars of up to 8,000"):
+            reading._avatar(tmp_path / name, 8000)
+
+
+@pytest.mark.parametrize("name", avatar_names())
+def test_what_is_counted_is_what_is_read(name, tmp_path):
+    from facegen.fileio.avatar import save_avatar
+
+    path = avatar_files(name, None)[0]
+    known = load_avatar(path)
+    save_avatar(known, tmp_path / "a.glb", {})
+    assert triangles(tmp_path / "a.glb") == len(known.mesh.faces)
+    assert triangles(path) <= len(known.mesh.faces)         # polygons of an OBJ file have more
+
+
+def test_what_takes_too_long_is_ended(tmp_path, monkeypatch):
+    """A reader that never ends stands for any file that makes one so."""
+    monkeypatch.setattr(reading, "_START", 2.0)
+    monkeypatch.setattr(reading, "_PROGRAM", "while True: pass")
+    (tmp_path / "a.obj").write_text("v 0 0 0")
+    begin = time.monotonic()
+    with pytest.raises(FileError, match="within 1 s"):
+        read_avatar_safely(tmp_path / "a.obj", Limits(read_seconds=1.0))
+    assert time.monotonic() - begin < 15.0
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="the bounds are the system's")
+@pytest.mark.parametrize(("does", "told"), [
+    ("x = bytearray(1 << 30)", "more than 256 MiB"), ("import os; os.abort()", "fail"), ("1 / 0", "ZeroDivisionError"),
+    ("open(f'{path}.bad', 'w', 1).write('x\\n')", "OSError"), ("while True: sum(range(10**6))", "within 1 s")])
+def test_what_a_reader_does_stays_in_its_process(tmp_path, monkeypatch, does, told):
+    (tmp_path / "a.obj").write_text("v 0 0 0")
+    body = "\n".join(f"    {line}" for line in does.split("\n"))
+    monkeypatch.setattr(reading, "_PROGRAM", reading._PROGRAM.replace(
+        "reading.answer()", f"def bad(path, most):\n{body}\n    return b''\nreading._avatar = bad\nreading.answer()"))
+    with pytest.raises(FileError, match=told):
+        read_avatar_safely(tmp_path / "a.obj", Limits(read_seconds=1.0, read_bytes=256 << 20))
+
+
+def test_an_answer_is_nothing_but_an_avatar():
+    """The process that read a stranger's file is not trusted either."""
+    class Evil:
+        def __reduce__(self):
+            return (eval, ("__import__('os').getpid()",))
+
+    import os
+
+    for found in (pickle.dumps(Evil()), pickle.dumps(os.system), pickle.dumps(load_avatar),
+                  b"cfacegen.fileio.binfile\nread_bytes\n."):
+        with pytest.raises(pickle.UnpicklingError, match="no part of an avatar"):
+            reading._Answers(io.BytesIO(found)).load()
+    mesh = Mesh.of(np.eye(3), np.array([[0, 1, 2]]))
+    assert isinstance(reading._Answers(io.BytesIO(pickle.dumps(mesh, 5))).load(), Mesh)
+
+
+def test_a_program_in_the_folder_is_not_run(tmp_path, monkeypatch, shipped):
+    (tmp_path / "numpy.py").write_text("raise SystemExit('run')")
+    (tmp_path / "json.py").write_text("raise SystemExit('run')")
+    monkeypatch.chdir(tmp_path)
+    assert read_avatar_safely(shipped).kind == "obj"
+
+
+def test_hostile_yaml_is_told_of(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    path = tmp_path / "a.yaml"
+    for text in ("!!python/object/apply:os.system ['touch owned']", "a: &x [1]\nb: [*x, *x]"):
+        path.write_text(text)
+        with pytest.raises((TableError, FileError), match=r"a\.yaml"):
+            read_data_safely(path, LIMITS)
+    for text in ("a: !!python/name:os.system", "a: &a [*a]", "[" * 5000, "{a: " * 5000, "a: 1\na: 2", "a: [", "\x00",
+                 "- " * 5000, "a: !!set {b, c}"):
+        path.write_text(text)
+        with pytest.raises((TableError, FileError), match=r"a\.yaml"):
+            reading._data(path, 0)
+    assert not (tmp_path / "owned").exists()
+
+
+def test_good_data_are_read(tmp_path):
+    (tmp_path / "a.yaml").write_text("a: [1, 2.5, x]\nb: {c: true}\n")
+    (tmp_path / "b.json").write_text('{"a": [1, null, "ü"]}')
+    assert read_data_safely(tmp_path / "a.yaml") == {"a": [1, 2.5, "x"], "b": {"c": True}}
+    assert read_data_safely(tmp_path / "b.json") == {"a": [1, None, "ü"]}
+    (tmp_path / "c.yaml").write_text("a: " + "x" * 5_000_000)
+    with pytest.raises(FileError, match="larger than 4 MB"):
+        read_data_safely(tmp_path / "c.yaml")
