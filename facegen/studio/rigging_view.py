@@ -109,7 +109,7 @@ class RiggingView:
 
     def _find(self, opened: Opened | None) -> None:
         """Have what was made before the page was loaded again."""
-        if self._face is None and self._current:
+        if self._face is None and opened is not None and self.maker.is_there(opened):
             try:
                 self._face = self.page.desk.face(opened.output, self.page.name)
             except FacegenError as error:
@@ -175,7 +175,7 @@ class RiggingView:
             base = self.page.desk.face(FaceWork().rig, self.page.name)
             self.page.stage.request(TEMPLATE, lambda: base.pose(meaning))
         rigged, opened = self._face, self.scene.opened
-        if self._current:
+        if self._current or rigging.missing(work.avatar):
             if self.page.stage.figures[RIGGED].mesh is not rigged.mesh():
                 self._stand(rigged.mesh())
             self.page.stage.request(RIGGED, lambda: rigged.pose(meaning))
