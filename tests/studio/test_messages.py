@@ -140,10 +140,13 @@ def test_nobody_shares_the_studio(studio_server, caplog):
     assert studio_server.viser._share_tunnel is None
 
 
-def test_who_goes_on_and_on_is_sent_away(panel):
+def test_who_goes_on_and_on_is_sent_away(panel, caplog):
     server, page, _, _, _ = panel()
-    page.send(*[{"type": "ShareUrlRequest"}] * 60)
-    assert page.closed() == 1008
+    with caplog.at_level(logging.WARNING, "facegen.studio"):
+        page.send(*[{"type": "ShareUrlRequest"}] * 90)
+        assert page.closed() == 1008
+    assert sum("sent away" in record.getMessage() for record in caplog.records) == 1
+    assert sum("refused a message" in record.getMessage() for record in caplog.records) == 5
     end = time.monotonic() + PATIENCE
     while not server.gone and time.monotonic() < end:
         time.sleep(0.02)

@@ -185,6 +185,15 @@ def test_refusals_are_told_in_one_line_each(studio_server, caplog):
     assert all("\n" not in line and "\r" not in line for line in lines)
 
 
+def test_a_flood_of_refusals_is_few_lines(studio_server, caplog):
+    with caplog.at_level(logging.WARNING, "facegen.studio"):
+        for _ in range(40):
+            assert request(studio_server.port, "/x")[0] == 404
+    lines = [record.getMessage() for record in caplog.records if record.name == "facegen.studio"]
+    assert 20 <= len(lines) < 40
+    assert "others are not told of" in lines[19]
+
+
 def test_a_slow_stranger_holds_nobody_up(studio_server, raw):
     """A hundred who never end their request, and more than may: a page comes in all the same."""
     slow = []
