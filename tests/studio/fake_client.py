@@ -77,8 +77,14 @@ class Maker:
             named.update(vertices=np.asarray(values[1]), faces=np.asarray(values[2]), visible=True)
         elif kind == "slider":
             named.update(zip(("min", "max", "step", "initial_value"), values[1:], strict=False))
+        elif kind in ("dropdown", "button_group"):
+            named["options"] = tuple(values[1])
+            named.setdefault("initial_value", values[1][0])
+        elif kind in ("markdown", "html"):
+            named["content"] = values[0]
         elif len(values) > 1:
             named.setdefault("initial_value", values[1])
+        named.setdefault("visible", True)
         if "initial_value" in named:
             named["value"] = named.pop("initial_value")
         made = Handle(kind, **named)
