@@ -20,7 +20,7 @@ Array = NDArray[np.float64]
 
 # Of the vector, mm, by which the slope is measured: lids bend little over so much.
 _STEP = 0.25
-_ROUNDS = 12
+_ROUNDS = 20
 # Millimetres that no eye sees.
 _NEAR = 1e-4
 # A vector that long, mm, leaves the face: half the width of a head.
@@ -86,22 +86,22 @@ class Grip:
         target = np.asarray(target, np.float64)
         free = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]) if self._middle else np.eye(3)
         vector = np.asarray(start, np.float64) * free.any(axis=0)
-        best = None
+        best = step = None
         for _ in range(_ROUNDS):
             here, *beside = self.places(controls, np.concatenate([vector[None], vector + _STEP * free]))
             miss = target - here
             away = float(np.linalg.norm(miss))
-            if best is None or away < best.missed - _NEAR:
+            if best is not None and away >= best.missed:        # too far: skin came to rest on something
+                step = step / 2.0
+            else:
                 best = Reached(vector, here, away)
-            elif away > best.missed + _NEAR or away <= _NEAR:
+                slope = (np.array(beside) - here).T / _STEP     # (3, free)
+                u, sizes, v = np.linalg.svd(slope, full_matrices=False)
+                held = sizes > _LEAST_SLOPE
+                step = ((u.T @ miss)[held] / sizes[held]) @ v[held] @ free
+            if best.missed <= _NEAR or np.linalg.norm(step) <= _NEAR:
                 break
-            if away <= _NEAR:
-                break
-            slope = (np.array(beside) - here).T / _STEP         # (3, free)
-            u, sizes, v = np.linalg.svd(slope, full_matrices=False)
-            held = sizes > _LEAST_SLOPE
-            step = ((u.T @ miss)[held] / sizes[held]) @ v[held] @ free
-            vector = vector + step
+            vector = best.vector + step
             size = np.linalg.norm(vector)
             if size > LONGEST:
                 vector = vector * (LONGEST / size)

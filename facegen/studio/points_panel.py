@@ -171,7 +171,7 @@ class PointsPanel:
 
     def _from_rest(self, work: Work, point: str) -> float:
         face = self._face
-        person = self.page.desk.person(work.face.person, self.page.name)
+        person = self.page.person()
         grip = Grip(face, point)
         rest = face.feature_point_places(face.mesh().vertices)[point]
         return float(np.linalg.norm(grip.places(raws.controls_of(work.face, face, person), np.zeros(3))[0] - rest))
@@ -212,7 +212,7 @@ class PointsPanel:
         if event.phase == "end":
             self._drag = None
         target = overlay.figure.unplace(event.end_position) + offset
-        person = self.page.desk.person(work.person, self.page.name)
+        person = self.page.person()
         moved = raws.dragged(work, face, person, name, target, mirrored=self._mirrored.value, grip=grip)
         self.page.change(f"drag {name}", thing=f"point {name}", face=replace(work, raw=moved))
 
@@ -259,7 +259,7 @@ class PointsPanel:
         deformation = raws.deformation_of(work.raw)
         about = f"Made by hand on the face {work.rig}."
         if self._what.value == _WHAT[1]:
-            meaning = work.meaning(self.page.desk.person(work.person, self.page.name))
+            meaning = self.page.meaning()
             deformation = whole_pose(face, meaning.deformation, *meaning.more, units=deformation.units)
             about = f"{work.script}, and what was moved by hand on the face {work.rig}."
         if not deformation:
@@ -293,7 +293,7 @@ def said(point: str, face: Face) -> str:
 
 
 def whole_pose(face: Face | None, *several: Deformation, units: str) -> Deformation:
-    """Return a sum of movements in one unit of length, without points that the face lacks or that take no vector.
+    """Return a sum of movements in one unit of length, without points and folds that the face lacks.
 
     face: None for an avatar, which cannot convert lengths: InputError if they differ.
     """
@@ -304,7 +304,9 @@ def whole_pose(face: Face | None, *several: Deformation, units: str) -> Deformat
         return total
     total = face.total(*several, units=units)
     strange = raws.strangers(total.as_dict(), face)
-    return replace(total, points={name: one for name, one in total.points.items() if name not in strange})
+    return replace(total, points={name: one for name, one in total.points.items() if name not in strange},
+                   folds={name: one for name, one in total.folds.items() if name in face.fold_names},
+                   with_jaw=tuple(name for name in total.with_jaw if name in face.feature_points))
 
 
 def read_raw(name: str, content: bytes) -> raws.Raw:

@@ -114,7 +114,7 @@ def dragged(work: FaceWork, face: Face, person: Person | None, point: str, targe
 
 def controls_of(work: FaceWork, face: Face, person: Person | None) -> Controls:
     """Return the deformer's input for a work."""
-    meaning = work.meaning(person)
+    meaning = work.meaning(person, face)
     return face.controls(meaning.deformation, *meaning.more, strict=False)
 
 

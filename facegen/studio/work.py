@@ -10,14 +10,25 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, fields, replace
 from typing import Any, Self
 
+from facegen.animation.streams.calibrate import Calibration
+from facegen.animation.streams.smooth import OneEuro
+from facegen.animation.streams.times import check_fps
 from facegen.errors import InputError, TableError
 from facegen.face.gaze import look_at
 from facegen.facs.deformation import Deformation, deformation_from_dict, weighted_sum
-from facegen.facs.expression_table import Person
+from facegen.facs.expression_table import HABITS, Person, person_from_data
 from facegen.facs.expressions import Resolution, resolve
 from facegen.facs.notation import canonical
+from facegen.facs.tables import load_units
 from facegen.facs.validate import Entry
 from facegen.studio.avatar_checks import check_avatar
+from facegen.studio.recordings import safe_name
+from facegen.studio.timeline import check_form
+
+SPEED = (0.1, 4.0)
+"""Least and most of a clip's speed, 1 as it is."""
+
+SHOWN = ("clip", "recording")
 
 VERSION = 1
 """Of the file's form."""
@@ -92,14 +103,35 @@ def _gazing(found: Resolution, raw: Deformation, gaze: Mapping[str, float], rig:
 
 @dataclass(frozen=True)
 class ClipWork:
-    """The timeline: a clip's script as plain data (docs/clips.md), and how it is played."""
+    """The timeline: a clip's script as plain data (docs/clips.md), a recording, and how they are played.
+
+    shown: which of `SHOWN` plays. recording: the name of the file in the work's folder, or None. recorded_fps: its
+    frames a second if the file has no times, 0 if it has. face_id, calibrate, smooth: as `facegen.load_performance`
+    takes them, "" for none; calibrate_head: head and gaze as well.
+    """
 
     script: Mapping[str, Any] = field(default_factory=dict)
     speed: float = 1.0
     loop: bool = True
+    shown: str = "clip"
+    recording: str | None = None
+    recorded_fps: float = 0.0
+    face_id: str = ""
+    calibrate: str = ""
+    calibrate_head: bool = False
+    smooth: str = ""
 
     def checked(self) -> Self:
         """Return itself, or raise InputError."""
+        if self.script:
+            check_form(dict(self.script))
+        Entry(self.speed, "clip", "speed").number(*SPEED)
+        Entry(self.shown, "clip", "shown").choice(SHOWN, "what is played")
+        if self.recording is not None:
+            safe_name(self.recording)
+        check_fps(self.recorded_fps or None)
+        Calibration.of(self.calibrate or None)
+        OneEuro.of(self.smooth or None)
         return self
 
 
@@ -133,13 +165,23 @@ class AvatarWork:
 
 @dataclass(frozen=True)
 class TableWork:
-    """A person's table on its way to a file, as plain data (docs/tables.md)."""
+    """A person's table on its way to a file.
 
-    person: Mapping[str, Any] = field(default_factory=dict)
-    units: Mapping[str, Any] = field(default_factory=dict)
+    file: the name it is saved under among the work's people (`Desk.people`), or None while there is no person. data:
+    the table as plain data (docs/tables.md); one without habits yet is no error here.
+    """
+
+    file: str | None = None
+    data: Mapping[str, Any] = field(default_factory=dict)
+
+    @property
+    def person(self) -> Person | None:
+        """Whose habits these are; nobody while there are none."""
+        return person_from_data(self.data, self.file or "table") if any(map(self.data.get, HABITS)) else None
 
     def checked(self) -> Self:
         """Return itself, or raise InputError."""
+        load_units().own_basis(self.person)
         return self
 
 

@@ -44,6 +44,8 @@ class Handle:
     def remove(self):
         self.removed = True
 
+    close = remove
+
 
 class Maker:
     """A scene or GUI: every ``add_x(label, ...)`` makes a handle and keeps it in ``made``."""
@@ -77,10 +79,10 @@ class Maker:
             named.update(vertices=np.asarray(values[1]), faces=np.asarray(values[2]), visible=True)
         elif kind == "slider":
             named.update(zip(("min", "max", "step", "initial_value"), values[1:], strict=False))
-        elif kind in ("dropdown", "button_group"):
-            named["options"] = tuple(values[1])
+        elif kind in ("dropdown", "button_group") and len(values) > 1:
             named.setdefault("initial_value", values[1][0])
-        elif kind in ("markdown", "html"):
+            named["options"] = values[1]
+        elif kind in ("html", "markdown"):
             named["content"] = values[0]
         elif len(values) > 1:
             named.setdefault("initial_value", values[1])
