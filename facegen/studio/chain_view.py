@@ -11,6 +11,7 @@ from facegen.face.chain import chain
 from facegen.facs.deformation import deformation_from_dict
 from facegen.facs.expressions import Resolution
 from facegen.facs.yamlfile import parse_yaml
+from facegen.facs.yamltext import yaml_text
 from facegen.studio.chain_words import chain_markdown
 from facegen.studio.latest import Latest
 from facegen.studio.page import Page
@@ -28,9 +29,7 @@ def read_raw(text: str) -> Mapping[str, Any]:
 
 def write_raw(raw: Mapping[str, Any]) -> str:
     """Return raw movements as the text that `read_raw` takes."""
-    import yaml
-
-    return yaml.safe_dump(dict(raw), sort_keys=False, default_flow_style=None, width=60).strip() if raw else ""
+    return yaml_text(raw).strip() if raw else ""
 
 
 class ChainView:
