@@ -260,7 +260,7 @@ class PointsPanel:
         about = f"Made by hand on the face {work.rig}."
         if self._what.value == _WHAT[1]:
             meaning = self.page.meaning()
-            deformation = whole_pose(face, meaning.deformation, *meaning.more, units=deformation.units)
+            deformation = raws.whole_pose(face, meaning.deformation, *meaning.more, units=deformation.units)
             about = f"{work.script}, and what was moved by hand on the face {work.rig}."
         if not deformation:
             raise InputError("file: nothing is moved here yet, so there is nothing to save")
@@ -290,23 +290,6 @@ def said(point: str, face: Face) -> str:
             words = words.removesuffix(end) + side
     paper = face.paper_names.get(point)
     return words[0].upper() + words[1:] + (f" ({paper})" if paper else "")
-
-
-def whole_pose(face: Face | None, *several: Deformation, units: str) -> Deformation:
-    """Return a sum of movements in one unit of length, without points and folds that the face lacks.
-
-    face: None for an avatar, which cannot convert lengths: InputError if they differ.
-    """
-    if face is None:
-        total = several[0]
-        for one in several[1:]:
-            total = total + one
-        return total
-    total = face.total(*several, units=units)
-    strange = raws.strangers(total.as_dict(), face)
-    return replace(total, points={name: one for name, one in total.points.items() if name not in strange},
-                   folds={name: one for name, one in total.folds.items() if name in face.fold_names},
-                   with_jaw=tuple(name for name in total.with_jaw if name in face.feature_points))
 
 
 def read_raw(name: str, content: bytes) -> raws.Raw:

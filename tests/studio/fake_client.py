@@ -86,6 +86,7 @@ class Maker:
             named["content"] = values[0]
         elif len(values) > 1:
             named.setdefault("initial_value", values[1])
+        named.setdefault("visible", True)
         if "initial_value" in named:
             named["value"] = named.pop("initial_value")
         made = Handle(kind, **named)
