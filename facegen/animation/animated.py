@@ -27,6 +27,7 @@ from facegen.fileio.avatar import ANIMATED, AvatarFile, save_animated, with_shap
 from facegen.fileio.gltf_animate import Keys
 from facegen.fileio.gltf_neck import Neck
 from facegen.fileio.textfile import check_place
+from facegen.progress import Progress, counted, silent, within
 
 Array = NDArray[np.float64]
 
@@ -46,12 +47,12 @@ class Animated:
 
 
 def save_animation(motion: Motion, path: str | os.PathLike[str], *, face: str | os.PathLike[str] = "akimoto",
-                   fps: float = 25.0, detail: int | None = None) -> Animated:
+                   fps: float = 25.0, detail: int | None = None, progress: Progress = silent) -> Animated:
     """Write a clip or a recording as an animation of blendshape weights (.glb, .gltf, .vrm).
 
     A recording keeps its own frames, the first at 0 s; a clip gets ``fps`` of them a second. The animation has the name
     of the file. detail: of the parametric face. Raises InputError, or FileError for the path, before anything is
-    written.
+    written. progress: called before each key.
     """
     path = check_place(path, ANIMATED)
     times, rig = motion.key_times(fps), load_face(face)
@@ -63,7 +64,9 @@ def save_animation(motion: Motion, path: str | os.PathLike[str], *, face: str | 
         avatar, weight = as_avatar(rig, shown.recipes(cues), _DETAIL if detail is None else detail)
         shown = shown.on_recipes
     warnings = [*motion.check(avatar)]
-    found = list(map(shown.weights_on(avatar), cues))
+    weigh = shown.weights_on(avatar)
+    found = [weigh(cue) for cue in counted(within(progress, 0.0, 0.9), "making the keys", cues)]
+    progress("writing the animation", 0.9)
     weights = avatar.corrected(np.array([one for one, _ in found]))
     head = np.array([turn for _, turn in found])
     keys, neck = _keys(path.stem, times, weights, head, avatar), _neck(avatar, weight)

@@ -13,9 +13,10 @@ from facegen.animation.coarticulation import SpeechTrack
 from facegen.animation.easing import DEFAULT_EASE, EASES
 from facegen.animation.idle import Idle
 from facegen.animation.layer import Layer
-from facegen.animation.speech_script import read_speech_entry
+from facegen.animation.speech_script import NO_FILES, read_speech_entry
 from facegen.animation.timing import load_timing
 from facegen.errors import FacegenError, InputError, TableError
+from facegen.facs.deformation import deformation_from_entry
 from facegen.facs.expression_table import Person, is_path, load_person
 from facegen.facs.expressions import Resolution, resolve
 from facegen.facs.tables import load_units
@@ -23,24 +24,25 @@ from facegen.facs.validate import Entry
 from facegen.facs.yamlfile import read_data
 from facegen.fileio.sound import Sound, mixed
 
-_POSE = ("pose", "head", "eyes", "intensity")
+_POSE = ("pose", "raw", "head", "eyes", "intensity")
 _PARTS = ("onset", "apex", "offset")
 _EYES = tuple(f"{mark}{number}" for number in range(61, 67) for mark in ("", "L", "R"))
 
 
 def load_clip(script: str | os.PathLike[str] | Mapping[str, object], *,
-              person: str | Path | Person | None = None, idle: int | Idle | None = None) -> Clip:
+              person: str | Path | Person | None = None, idle: int | Idle | None = None, files: bool = True) -> Clip:
     """Return the clip of a script: the path of a YAML or JSON file, or the same as plain data.
 
-    person: whose habits, instead of the script's. idle: the seed of an idle layer, instead of the script's.
+    person: whose habits, instead of the script's. idle: the seed of an idle layer, instead of the script's. files:
+    whether the script may name files (poses, people, timings, sounds); say False for one that a stranger wrote.
     Raises FileError, or TableError that names the place in the script.
     """
     if isinstance(script, Mapping):
-        return _Reader(Entry(script, "clip"), Path(), person).clip(idle)
+        return _Reader(Entry(script, "clip"), Path(), person, files).clip(idle)
     if not isinstance(script, (str, os.PathLike)):
         raise InputError(f"script: expected the path of a YAML or JSON file, or a mapping, got {type(script).__name__}")
     path = Path(script)
-    return _Reader(Entry(read_data(path), str(path)), path.parent, person).clip(idle)
+    return _Reader(Entry(read_data(path), str(path)), path.parent, person, files).clip(idle)
 
 
 def morph(*poses: object, seconds: float = 1.0, hold: float = 0.5, back: bool = False, ease: str = DEFAULT_EASE,
@@ -79,8 +81,8 @@ def _idle(idle: int | Idle | None) -> Idle | None:
 class _Reader:
     """One pass over a script."""
 
-    def __init__(self, root: Entry, folder: Path, person: str | Path | Person | None) -> None:
-        self.root, self.folder = root, folder
+    def __init__(self, root: Entry, folder: Path, person: str | Path | Person | None, files: bool) -> None:
+        self.root, self.folder, self.files = root, folder, files
         self.fields = root.fields(optional=("about", "duration", "person", "intensity", "idle", "keyframes", "events",
                                             "tracks", "speech"))
         self.person = load_person(person) if person is not None else self._person()
@@ -132,7 +134,7 @@ class _Reader:
         return duration
 
     def _speech(self, name: str, fields: Mapping[str, Entry]) -> SpeechTrack:
-        said = read_speech_entry(fields["speech"], self.folder)
+        said = read_speech_entry(fields["speech"], self.folder, files=self.files)
         self.warnings += said.speech.warnings
         if said.sound is not None:
             self.sounds.append((said.at, said.sound))
@@ -161,7 +163,7 @@ class _Reader:
         if entry.value == "all":
             return "all"
         try:
-            found = resolve(str(entry.value) if type(entry.value) is int else entry.text())
+            found = resolve(self._no_file(entry, str(entry.value) if type(entry.value) is int else entry.text()))
         except FacegenError as error:
             raise entry.fail(f"expected all, or units such as 24+25+26: {error}") from error
         if not found.units:
@@ -192,18 +194,23 @@ class _Reader:
 
     def _pose(self, entry: Entry, fields: Mapping[str, Entry], default: str | None) -> tuple[Pose, str | None]:
         """Return what an entry shows, and the name of its expression; ``default`` is the pose of its kind."""
-        if not any(key in fields for key in ("pose", "head", "eyes")) and default is None:
-            raise entry.fail("nothing to show: give pose, head or eyes")
+        if not any(key in fields for key in ("pose", "raw", "head", "eyes")) and default is None:
+            raise entry.fail("nothing to show: give pose, raw, head or eyes")
         poses, name = [], None
-        if "pose" in fields or not ("head" in fields or "eyes" in fields):
-            intensity = self.intensity * (fields["intensity"].number(0.0, 1.0) if "intensity" in fields else 1.0)
+        intensity = self.intensity * (fields["intensity"].number(0.0, 1.0) if "intensity" in fields else 1.0)
+        if "pose" in fields or not any(key in fields for key in ("raw", "head", "eyes")):
             at = fields.get("pose", entry)
             found = self._meaning(at, at.value if "pose" in fields else default, intensity)
             self.warnings += found.warnings
             poses.append(pose_of(found))
             name = found.expression.name if found.expression else None
-        elif "intensity" in fields:
+        elif "intensity" in fields and "raw" not in fields:
             raise fields["intensity"].fail("intensity belongs to a pose; angles are degrees as they are")
+        if "raw" in fields:
+            raw = deformation_from_entry(fields["raw"]) * intensity
+            if any(pose.raw is not None for pose in poses):
+                raise fields["raw"].fail("the pose is raw data already; give it units, or leave one of the two out")
+            poses.append(Pose(raw=raw))
         for part in ("head", "eyes"):
             if part in fields:
                 poses.append(self._turned(part, fields[part]))
@@ -217,10 +224,18 @@ class _Reader:
             what = str(what)
         if isinstance(what, str) and is_path(what) and not Path(what).expanduser().is_absolute():
             what = str(self.folder / what)          # files lie beside the script
+        if isinstance(what, str):
+            self._no_file(entry, what)
         try:
             return resolve(what, person=self.person, intensity=intensity)
         except FacegenError as error:
             raise entry.fail(str(error).removeprefix("what: ")) from error
+
+    def _no_file(self, entry: Entry, text: str) -> str:
+        """Return a text; an error if it names a file where none may be named."""
+        if not self.files and is_path(text):
+            raise entry.fail(NO_FILES)
+        return text
 
     def _turned(self, part: str, entry: Entry) -> Pose:
         angles = {axis: one.number(-360.0, 360.0) for axis, one in entry.fields(optional=AXES[part]).items()}
@@ -233,7 +248,7 @@ class _Reader:
         if "person" not in self.fields:
             return None
         entry = self.fields["person"]
-        name = entry.text()
+        name = self._no_file(entry, entry.text())
         try:
             return load_person(self.folder / name if is_path(name) else name)
         except FacegenError as error:

@@ -20,6 +20,9 @@ from facegen.facs.validate import Entry
 from facegen.fileio.sound import Sound, read_wav
 
 LANGUAGE = "en-us"
+NO_FILES = "this script may name no files; write here what the file holds"
+"""What is said where `facegen.load_clip` was told that no file may be opened."""
+
 _WAYS = ("text", "phonemes", "timing")
 _OF = {"language": "text", "speed": "text and phonemes", "alphabet": "phonemes and timing", "tier": "timing"}
 
@@ -73,8 +76,11 @@ def speech_clip(said: Said, *, effort: float = 1.0, expression: Resolution | Non
                 own_units([expression] if expression is not None else []))
 
 
-def read_speech_entry(entry: Entry, folder: Path) -> Said:
-    """Return the speech of a script's entry: a file of timings beside it, a text, or a mapping. TableError."""
+def read_speech_entry(entry: Entry, folder: Path, *, files: bool = True) -> Said:
+    """Return the speech of a script's entry: a file of timings beside it, a text, or a mapping. TableError.
+
+    files: whether it may name files.
+    """
     if not isinstance(entry.value, dict):
         value = entry.text()
         asked: dict[str, object] = {"timing" if Path(value).suffix.lower() in SUFFIXES else "text": value}
@@ -93,6 +99,8 @@ def read_speech_entry(entry: Entry, folder: Path) -> Said:
             asked["speed"] = fields["speed"].number(0.1, 10.0)
     for key in ("timing", "sound"):
         if key in asked:
+            if not files:
+                raise fields.get(key, entry).fail(NO_FILES)
             asked[key] = folder / str(asked[key])           # files lie beside the script
     try:
         said = say(**asked)

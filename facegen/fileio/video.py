@@ -21,6 +21,7 @@ from facegen.errors import InputError
 from facegen.fileio.images import check_pixels, over_colour
 from facegen.fileio.sound import Sound
 from facegen.fileio.textfile import check_place, whole_file
+from facegen.progress import Progress, silent
 
 _PAPER = (255, 255, 255)
 # Frames from which a GIF's one palette is made: enough to see every colour of a face, few enough to be quick.
@@ -62,13 +63,13 @@ FORMATS = {
 
 
 def save_video(frames: Iterable[ArrayLike], path: str | os.PathLike[str], *, fps: float = 25.0,
-               sound: Sound | None = None) -> Path:
+               sound: Sound | None = None, progress: Progress = silent) -> Path:
     """Write frames, each (h, w, 3) or (h, w, 4) uint8, as a film by the path's suffix; return the path.
 
     .mp4 (H.264) and .webm (VP9) need PyAV, ``pip install "facegen[video]"``, and even sizes. .gif, .webp, .apng and
     .png run round and round. .webp, .apng and .png keep transparency, the others get white behind. The file appears
     whole or not at all. Frames may come one by one: MP4 and WebM hold one at a time. sound: begins with the first
-    frame; MP4 and WebM only.
+    frame; MP4 and WebM only. progress: called before each frame; its share stays 0 where frames come one by one.
 
     Raises InputError for the frames or fps, FileError for the path. ::
 
@@ -88,10 +89,18 @@ def save_video(frames: Iterable[ArrayLike], path: str | os.PathLike[str], *, fps
     with whole_file(path, "the film ") as draft, open(draft, "wb") as file:
         rate = Fraction(fps).limit_denominator(10_000)
         if form.codec:
-            _write_video(file, form, frames, rate, shape, sound)
+            _write_video(file, form, _told(frames, progress), rate, shape, sound)
         else:
-            _write_pillow(file, form, frames, rate, shape)
+            _write_pillow(file, form, frames, rate, shape, progress)
     return path
+
+
+def _told(frames: Iterable[ArrayLike], progress: Progress) -> Iterator[ArrayLike]:
+    """Yield frames and tell of each."""
+    count = len(frames) if isinstance(frames, Sequence) else 0
+    for k, frame in enumerate(frames):
+        progress("writing the film", k / count if count else 0.0)
+        yield frame
 
 
 def check_film(path: str | os.PathLike[str], *, size: tuple[int, int], fps: float) -> Format:
@@ -190,10 +199,11 @@ class _Watched:
 
 
 # -- Pillow -----------------------------------------------------------------------------------------------------
-def _write_pillow(file: Any, form: Format, frames: Iterable[ArrayLike], fps: Fraction, shape: tuple[int, ...]) -> None:
+def _write_pillow(file: Any, form: Format, frames: Iterable[ArrayLike], fps: Fraction, shape: tuple[int, ...],
+                  progress: Progress) -> None:
     if not isinstance(frames, Sequence):
         frames = list(frames)       # Pillow must know how many there are
-    film = _film(frames, shape, form)
+    film = _film(frames, shape, form, progress)
     options = dict(form.options)
     if form.kind == "PNG":
         options["default_image"] = False
@@ -206,8 +216,8 @@ def durations(count: int, fps: Fraction, ticks: int) -> list[int]:
     return [(after - before) * 1000 // ticks for before, after in itertools.pairwise(marks)]
 
 
-def _film(frames: Sequence[ArrayLike], shape: tuple[int, ...], form: Format) -> Any:
-    """Return a Pillow image of many frames that holds one at a time."""
+def _film(frames: Sequence[ArrayLike], shape: tuple[int, ...], form: Format, progress: Progress) -> Any:
+    """Return a Pillow image of many frames that holds one at a time, and tells how far its writer is."""
     from PIL import Image
 
     def picture(k: int) -> Any:
@@ -221,11 +231,14 @@ def _film(frames: Sequence[ArrayLike], shape: tuple[int, ...], form: Format) -> 
 
         def __init__(self) -> None:
             super().__init__()
+            self._farthest = 0
             self.seek(0)
 
         def seek(self, frame: int) -> None:
             if not 0 <= frame < self.n_frames:
                 raise EOFError
+            self._farthest = max(self._farthest, frame)         # writers go back to the first
+            progress("writing the film", self._farthest / self.n_frames)
             one = picture(frame)
             if palette is not None:
                 one = one.quantize(palette=palette, dither=Image.Dither.NONE)   # dither would crawl between frames

@@ -42,6 +42,7 @@ from facegen.fileio.video import FORMATS, check_film, save_video
 from facegen.geometry.camera import Camera, check_view, frame
 from facegen.jobs.digests import digest_of, face_digest, file_digest
 from facegen.jobs.runner import Report, run, shared
+from facegen.progress import Progress, silent, within
 from facegen.render.backends import choose, warm
 from facegen.render.dress import portrait
 from facegen.render.render import Renderer
@@ -113,15 +114,17 @@ class FrameTask:
 def save_clip(clip: Motion | Performance, path: str | os.PathLike[str], *, fps: float = 25.0,
               size: int | tuple[int, int] = 512, view: tuple[float, float] = (0.0, 0.0),
               face: str | os.PathLike[str] = "akimoto", detail: int | None = None, background: Any = "plain",
-              renderer: str = "auto", workers: int = 1, step: Callable[[], None] | None = None) -> Report:
+              renderer: str = "auto", workers: int = 1, step: Callable[[], None] | None = None,
+              progress: Progress = silent) -> Report:
     """Draw a clip, or a recording, into a film or into a folder of numbered pictures, and say what was done.
 
     clip: a `Clip`, a `Performance`, or a `Playback` of one. path: .mp4, .webm, .gif, .webp, .apng or .png; a name
     without suffix is a folder that gets ``frame_00001.png`` and so on; .glb, .gltf or .vrm becomes an animation of
     blendshapes, see `facegen.animation.animated.save_animation`, for which the camera's options do not count. face: a
     face's name or path. workers: processes that draw; in a script, more than 1 needs the usual
-    ``if __name__ == "__main__":``. step: called once a frame. The rest is as for `Renderer`; the camera stands still
-    and shows all that the clip reaches.
+    ``if __name__ == "__main__":``. step: called once a frame. progress: called with what is done and the
+    share that is behind; what it raises stops the work as Ctrl-C does. The rest is as for `Renderer`; the camera stands
+    still and shows all that the clip reaches.
 
     The same call after a stop goes on where it stopped. Raises InputError, or FileError for the path, before work
     starts. ::
@@ -132,15 +135,16 @@ def save_clip(clip: Motion | Performance, path: str | os.PathLike[str], *, fps: 
     clip = as_motion(clip)
     count = clip.frames(fps)
     if Path(path).suffix.lower() in ANIMATED:
-        return Report(save_animation(clip, path, face=face, fps=fps, detail=detail).keys, 0)
+        return Report(save_animation(clip, path, face=face, fps=fps, detail=detail, progress=progress).keys, 0)
     rig, name, mesh, level, chosen = _prepared(face, size, view, detail, background, renderer, count)
     clip.check(rig)                     # a point that this face lacks is said now
     target = _Target(Path(path), size, fps)
     head = portrait(rig, mesh.vertices)
+    progress("looking how far it reaches", 0.0)
     camera = frame(head, _reach(rig, clip, frame(head, size=size, view=view)), size=size, view=view)
     shot = Shot(clip.shown, float(fps), count, name, level, background, chosen, (camera,))
     cues = [clip.cue(frame_time(k, fps)) for k in range(count)]
-    return target.fill(shot, cues, workers, step, sound=getattr(clip, "sound", None))
+    return target.fill(shot, cues, workers, step, sound=getattr(clip, "sound", None), progress=progress)
 
 
 def as_motion(clip: Motion | Performance) -> Motion:
@@ -245,7 +249,7 @@ class _Target:
                             "them")
 
     def fill(self, shot: Shot, cues: Sequence[Any], workers: int, step: Callable[[], None] | None, *,
-             sound: Sound | None = None) -> Report:
+             sound: Sound | None = None, progress: Progress = silent) -> Report:
         """Draw what is missing and put the film together, with a sound if its kind can have one.
 
         cues: of every frame.
@@ -256,10 +260,12 @@ class _Target:
                  for k, (cue, path) in enumerate(zip(cues, paths, strict=True))]
         if workers > 1:
             warm(shot.renderer, coloured=load_face(shot.face).mesh(shot.detail).colours is not None)
-        report = run(tasks, workers=workers, step=step)
+        drawing = _Steps(within(progress, 0.0, 0.9 if self.is_film else 1.0), len(tasks), step)
+        report = run(tasks, workers=workers, step=drawing.step)
         if self.is_film:
             heard = sound if FORMATS[self.path.suffix.lower()].sound else None
-            save_video(_Frames(paths), self.path, fps=self.fps, sound=heard)
+            save_video(_Frames(paths), self.path, fps=self.fps, sound=heard,
+                       progress=within(progress, 0.9, 1.0))
             shutil.rmtree(self.folder, ignore_errors=True)
         return report
 
@@ -280,6 +286,20 @@ class _Target:
                 raise FileError(f"{self.folder}: old frames cannot be removed: {error.strerror or error}") from error
             text = json.dumps({"fingerprint": shot.fingerprint, "frames": shot.frames, "fps": shot.fps})
             save_text(text + "\n", stamp)
+
+
+class _Steps:
+    """Counts the frames that are drawn, and tells of them."""
+
+    def __init__(self, progress: Progress, count: int, step: Callable[[], None] | None) -> None:
+        self.progress, self.count, self.also, self.done = progress, count, step, 0
+        progress("drawing", 0.0)
+
+    def step(self) -> None:
+        self.done += 1
+        if self.also is not None:
+            self.also()
+        self.progress(f"drawing, {self.done} of {self.count}", self.done / self.count)
 
 
 class _Frames(Sequence):

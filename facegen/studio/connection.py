@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any
 from websockets.asyncio.server import ServerConnection
 from websockets.protocol import State
 
-from facegen.studio.wire import Gate, Refused, UploadStart, read
+from facegen.studio.gate import Gate
+from facegen.studio.wire import Refused, UploadStart, read
 
 if TYPE_CHECKING:
     from facegen.studio.server import StudioServer

@@ -68,6 +68,12 @@ class Desk:
                 self._faces[key] = found = changed, self._load(key, wait)
         return found[1]
 
+    def face_file(self, name: str, work: str) -> str:
+        """Return what `facegen.load_face` takes for a face that `face` gave: its name, or its file's path."""
+        if Path(name).suffix in RIGGED:
+            return str(self.store.folder / work / FACES / name)
+        return name if name in face_names() else str(self.store.folder / _AVATARS / f"{name}.glb")
+
     def people(self, work: str) -> tuple[str, ...]:
         """Return the people that a page can choose: shipped ones by name, its own by their file's name."""
         return (*people(), *sorted(path.name for path in (self.store.folder / work / PEOPLE).glob("*.yaml")))

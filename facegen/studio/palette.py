@@ -39,14 +39,11 @@ class Palette:
             self._search = gui.add_text("Search", "", hint="A name or another word for it: joy, crying, smirk")
             self._search.on_update(page.calls(self._searched))
             self._mix = gui.add_checkbox("Click adds to the mixture", False,
-                                         hint="Off: a click shows that expression alone. On: it joins what is shown.")
+                                         hint="Off: a click shows that expression alone. On: it joins what is shown, "
+                                              "or leaves it.")
             self._grid = gui.add_folder(None)
             self._none = gui.add_markdown("", visible=False)
         self._mixture = gui.add_folder("Mixture", visible=False)
-        with self._mixture:
-            clear = gui.add_button("Take the mixture apart", hint="Keeps the units and forgets which names made them.",
-                                   order=1e9)
-            clear.on_click(page.calls(self._forget))
 
     def close(self) -> None:
         """End the drawing of thumbnails."""
@@ -81,9 +78,6 @@ class Palette:
         face = self._page.work.face
         units = blend(shares, person=self._page.person())
         self._page.change(label, thing=thing, face=replace(face, units=units, blend=shares))
-
-    def _forget(self) -> None:
-        self._page.change("mixture taken apart", face=replace(self._page.work.face, blend={}))
 
     # -- what is shown ------------------------------------------------------------------------------------------
     def refresh(self, work: Work) -> None:

@@ -28,7 +28,8 @@ if TYPE_CHECKING:
     from websockets.asyncio.server import ServerConnection
     from websockets.http11 import Request, Response
 
-    from facegen.studio.wire import Element, Refused
+    from facegen.studio.gate import Element
+    from facegen.studio.wire import Refused
 
 log = logging.getLogger("facegen.studio")
 
@@ -75,7 +76,7 @@ class StudioServer:
         self._viser: viser.ViserServer | None = None
         self._works: dict[int, str] = {}        # of each page, by the number that viser gives it
         self._seen: set[str] = set()
-        self._open: set[ServerConnection] = set()
+        self._open: dict[ServerConnection, str] = {}        # the works of the pages that are connected
         self._last_told: dict[int, tuple[str, float]] = {}
         self._ready = False
 
@@ -105,7 +106,7 @@ class StudioServer:
         import_viser()
         from facegen.studio import seam
         from facegen.studio.connection import guarded
-        from facegen.studio.wire import Budget
+        from facegen.studio.gate import Budget
 
         self._seam, self.budget = seam, Budget(4 * self.limits.upload_bytes)
         self._page = front.Page(seam.page_file())
@@ -155,8 +156,8 @@ class StudioServer:
         work = guard.work_of(path)
         if refusal is None and work is None and (path != "/" or websocket):
             refusal = guard.Refusal(404, "there is nothing here; the studio begins at /")
-        if refusal is None and work is not None:
-            refusal = self._full(work)
+        if refusal is None and work is not None and (websocket or work not in self._open.values()):
+            refusal = self._full(work)      # a page that is loaded again is still connected
         if refusal is not None:
             log.warning("refused %s %s: %s", "a websocket to" if websocket else "a request for", ascii(path[:80]),
                         refusal.why)
@@ -205,13 +206,13 @@ class StudioServer:
             await connection.close(1013, "too many pages are open")
             return
         self._seen.add(work)
-        self._open.add(connection)
+        self._open[connection] = work
         try:
             await viser_handler(connection)
         except Exception as error:
             log.error("a page was lost: %s", _told(error))
         finally:
-            self._open.discard(connection)
+            self._open.pop(connection, None)
             connection.gate.close()
             if connection.close_code == 1009:
                 log.warning("a page was sent away: it sent more than %d bytes at once", self.limits.message_bytes)

@@ -11,8 +11,8 @@ from PIL import Image
 
 from facegen.facs.deformation import Deformation
 from facegen.facs.expressions import Resolution
+from facegen.studio.chain_view import write_raw
 from facegen.studio.page import Page
-from facegen.studio.script_box import write_raw
 from facegen.studio.work import FaceWork, Work
 
 _SIZES = ("256", "512", "1024", "2048", "1920x1080")

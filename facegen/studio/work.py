@@ -10,6 +10,9 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, fields, replace
 from typing import Any, Self
 
+from facegen.animation.streams.calibrate import Calibration
+from facegen.animation.streams.smooth import OneEuro
+from facegen.animation.streams.times import check_fps
 from facegen.errors import InputError, TableError
 from facegen.face.gaze import look_at
 from facegen.facs.deformation import Deformation, deformation_from_dict, weighted_sum
@@ -19,6 +22,13 @@ from facegen.facs.notation import canonical
 from facegen.facs.tables import load_units
 from facegen.facs.validate import Entry
 from facegen.studio.avatar_checks import check_avatar
+from facegen.studio.recordings import safe_name
+from facegen.studio.timeline import check_form
+
+SPEED = (0.1, 4.0)
+"""Least and most of a clip's speed, 1 as it is."""
+
+SHOWN = ("clip", "recording")
 
 VERSION = 1
 """Of the file's form."""
@@ -93,14 +103,35 @@ def _gazing(found: Resolution, raw: Deformation, gaze: Mapping[str, float], rig:
 
 @dataclass(frozen=True)
 class ClipWork:
-    """The timeline: a clip's script as plain data (docs/clips.md), and how it is played."""
+    """The timeline: a clip's script as plain data (docs/clips.md), a recording, and how they are played.
+
+    shown: which of `SHOWN` plays. recording: the name of the file in the work's folder, or None. recorded_fps: its
+    frames a second if the file has no times, 0 if it has. face_id, calibrate, smooth: as `facegen.load_performance`
+    takes them, "" for none; calibrate_head: head and gaze as well.
+    """
 
     script: Mapping[str, Any] = field(default_factory=dict)
     speed: float = 1.0
     loop: bool = True
+    shown: str = "clip"
+    recording: str | None = None
+    recorded_fps: float = 0.0
+    face_id: str = ""
+    calibrate: str = ""
+    calibrate_head: bool = False
+    smooth: str = ""
 
     def checked(self) -> Self:
         """Return itself, or raise InputError."""
+        if self.script:
+            check_form(dict(self.script))
+        Entry(self.speed, "clip", "speed").number(*SPEED)
+        Entry(self.shown, "clip", "shown").choice(SHOWN, "what is played")
+        if self.recording is not None:
+            safe_name(self.recording)
+        check_fps(self.recorded_fps or None)
+        Calibration.of(self.calibrate or None)
+        OneEuro.of(self.smooth or None)
         return self
 
 

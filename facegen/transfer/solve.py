@@ -21,6 +21,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -63,7 +64,7 @@ OURS = Weights(gradients=1.0, landmarks=20.0, anchor=0.032)
 
 
 class Transfer:
-    """The factored system from one template's skin to one avatar's: built once, ``solve`` for any shapes."""
+    """The system from one template's skin to one avatar's: built once, ``solve`` for any shapes."""
 
     def __init__(self, surface: Surface, template: Surface, feet: Feet, triangle_feet: Feet, matrices: NDArray,
                  turns: NDArray, landmarks: sparse.csr_array, landmark_motion: sparse.csr_array,
@@ -85,7 +86,7 @@ class Transfer:
             matrix = matrix + weights.landmarks * (landmarks.T @ landmarks)
         matrix = sparse.csc_array(matrix)
         matrix = matrix + sparse.diags_array(_TIE * matrix.diagonal() + 1e-12 * matrix.diagonal().max())
-        self._factor = Factor(matrix, what="the transfer to the avatar")
+        self._matrix = matrix
         right = weights.gradients * self._gradient_part(surface, template, triangle_feet, turns)
         pulled = sparse.diags_array(anchor) @ (sparse.diags_array(feet.found.astype(float)) + lining)
         right = right + sparse.kron(pulled, sparse.identity(3), format="csr") @ self._carried(template, feet, matrices)
@@ -94,6 +95,10 @@ class Transfer:
             right = right + weights.landmarks * (spread @ landmark_motion)
         self._right = sparse.csr_array(right)
         self._shape = (n, n_s)
+
+    @cached_property
+    def _factor(self) -> Factor:
+        return Factor(self._matrix, what="the transfer to the avatar")
 
     @staticmethod
     def _gradient_part(surface: Surface, template: Surface, feet: Feet, turns: NDArray) -> sparse.csr_array:

@@ -110,7 +110,7 @@ class StudioPage:
     def row(self, label: str):
         """The line of the panel that a label begins: slider, number, text, choice, check box."""
         named = self.page.locator("label", has_text=re.compile(rf"^{re.escape(label)}$")).locator("visible=true")
-        return named.first.locator("xpath=ancestor::div[.//input][1]")
+        return named.first.locator("xpath=ancestor::div[.//input or .//textarea][1]")
 
     def input(self, label: str):
         """The box of a labelled line in which one types."""

@@ -256,9 +256,14 @@ def test_an_upload_is_kept_with_the_work_and_found_after_a_reload(tmp_path):
     assert wait(lambda: first.work.file)
     assert first.work.file == "my_cat.obj"
     first.gui.find("Open an avatar").enter(Upload("bad.glb", b"glTF"))
-    assert wait(lambda: first.client.notices)
-    assert first.client.notices[0][0] == "That cannot be"
+    assert wait(lambda: [title for title, _ in first.client.notices if title == "That cannot be"])
     assert first.work.file == "my_cat.obj"
+    assert ("Colours are missing", "They are in cat.mtl: open that file too.") in first.client.notices
+    plain = first.panel.scene.figure
+    colours = avatar_files("cat", None)[0].with_suffix(".mtl").read_bytes()
+    first.gui.find("Open an avatar").enter(Upload("cat.mtl", colours))
+    assert first.panel.scene.opened.avatar.colours
+    assert first.panel.scene.figure is not plain, "it is painted"
     first.page.close()
     again = Opened(tmp_path, avatar=None)
     assert again.work.file == "my_cat.obj"

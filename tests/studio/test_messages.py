@@ -12,8 +12,8 @@ import pytest
 from studio_raw import CAMERA
 
 from facegen.errors import InputError
+from facegen.studio.gate import PART
 from facegen.studio.limits import Limits
-from facegen.studio.wire import PART
 
 
 @pytest.fixture
@@ -187,6 +187,18 @@ def test_a_file_over_the_limit_is_refused_before_it_comes(panel):
     assert [label for label, _ in events] == ["smile"]
     assert not server.pages[0][0].gui._current_file_upload_states
     assert server.budget.taken == 0
+
+
+@pytest.mark.parametrize(("name", "size", "told"), [
+    ("a.exe", 10, "expected a file that ends in .glb, .yaml"), ("a.glb.exe", 10, "expected a file"),
+    ("glb", 10, "expected a file"), ("a.yaml", 2**20, "up to 0.5 MiB"), ("a.YAML", 2**20, "up to 0.5 MiB"),
+    ("a.glb", 2**30, "up to 64.0 MiB")])
+def test_a_file_of_another_kind_or_size_is_told_of(serve, raw, name, size, told):
+    server = serve(lambda client, work: client.gui.add_upload_button("open", mime_type=".glb,.yaml"))
+    page = raw(server).begin()
+    page.send(_start(page.element("open"), size, filename=name))
+    assert told in page.until("NotificationShowMessage")["props"]["body"]
+    assert not server.pages[0][0].gui._current_file_upload_states
 
 
 @pytest.mark.parametrize("lie", ["parts", "many parts", "long part", "short part", "twice", "index", "elsewhere"])

@@ -222,6 +222,7 @@ def test_no_more_pages_than_may_be(serve, raw):
     status, _, body = request(server.port, "/w/" + "c" * 20)
     assert status == 503
     assert b"close one" in body
+    assert request(server.port, "/w/" + "a" * 20)[0] == 200     # it is loaded again
     first.close()
     time.sleep(0.5)
     third = raw(server, "c" * 20)

@@ -60,6 +60,8 @@ def test_it_is_a_face_of_the_work_and_of_no_other(made):
 def test_whatever_changes_the_shapes_makes_the_file_old(made, change):
     _, maker, work, opened, *_ = made
     assert not maker.is_made(replace(work, **change), opened)
+    assert maker.is_there(opened)
+    assert not maker.is_there(replace(opened, avatar=replace(opened.avatar, digest="0" * 64))), "another avatar's"
     assert maker.is_made(replace(work, symmetric=False, skipped={"jaw_L": True}), opened)
 
 
