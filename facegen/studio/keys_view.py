@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any, Protocol
 
 from facegen.animation.easing import DEFAULT_EASE
@@ -77,7 +78,7 @@ class KeysView:
         self._times = {}
         for part, (label, hint) in _PARTS.items():
             self._times[part] = number = gui.add_number(label, 0.0, min=0.0, step=0.005, hint=hint)
-            number.on_update(calls(lambda part=part: self._set(part, **{part: float(self._times[part].value)})))
+            number.on_update(calls(partial(self._timed, part)))
         self._acts = gui.add_button_group("", _ACTS, hint="Show the face of the Face tab here; copy this key to the "
                                                           "time of the slider; delete it.")
         self._acts.on_click(calls(self._act))
@@ -224,6 +225,9 @@ class KeysView:
         chosen = self._host.chosen
         script = timeline.change(self._host.script, chosen.track, chosen.index, **fields)
         self._host.edit(label, script, chosen, thing=label)
+
+    def _timed(self, part: str) -> None:
+        self._set(part, **{part: float(self._times[part].value)})
 
     def _act(self) -> None:
         chosen, act = self._host.chosen, self._acts.value
