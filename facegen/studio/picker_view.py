@@ -66,8 +66,6 @@ class PickerView:
         self._skip.on_click(calls(self._skip_one))
         self._rest = gui.add_button("Skip the optional points", color="gray")
         self._rest.on_click(calls(self._skip_rest))
-        self._undo = gui.add_button("Undo", color="gray")
-        self._undo.on_click(calls(self.page.undo))
         self._faults = gui.add_markdown("", visible=False)
         labels = [_NEXT, *(WORDS[name].label for name in ORDER)]
         self._point = gui.add_dropdown("Point", labels, initial_value=_NEXT, hint="Choose a point to place it "
@@ -118,7 +116,7 @@ class PickerView:
 
     def refresh(self, work: Work) -> None:
         """Show a work."""
-        stamp = (work.avatar, self.scene.figure, self.on, self.proposals, self.chosen, self.page.history.undoes)
+        stamp = (work.avatar, self.scene.figure, self.on, self.proposals, self.chosen)
         if stamp == self._stamp:                # a slider of the face that is dragged changes nothing of this
             return
         self._stamp = stamp
@@ -138,10 +136,9 @@ class PickerView:
                 (self._skip, on and name in OPTIONAL and name not in avatar.landmarks),
                 (self._rest, on and name in OPTIONAL), (self._remove, on and name in avatar.landmarks),
                 (self._point, on), (self._both, on), (self._follow, on), (self._look, on), (self._bar, on),
-                (self._guide, on and name is not None), (self._undo, on)):
+                (self._guide, on and name is not None)):
             handle.visible = visible
         self._all.label = f"Take all proposals ({len(self._open_proposals(avatar))})"
-        self._undo.disabled = self.page.history.undoes is None
         self._show_faults(on)
         self._list.content = self._listed(avatar)
         if on and name is not None and name != self._shown:
