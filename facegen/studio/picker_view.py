@@ -317,14 +317,10 @@ class PickerView:
         if not self.on or known == self._known:
             return
         self._known = known
-
-        def think() -> None:
-            adviser = self._advise()
-            if not adviser.ready:
-                self._advised(known, adviser.first(avatar))
-            self._advised(known, adviser.advice(avatar))
-
-        self._thinking.ask(think)
+        adviser = self._advise()
+        if not adviser.ready:                               # while a face is looked for mirroring says something
+            self.proposals = adviser.first(avatar)
+        self._thinking.ask(lambda: self._advised(known, adviser.advice(avatar)))
 
     def _advised(self, known: Any, advice: Advice) -> None:
         """Show advice, if the points are still those that it is of."""

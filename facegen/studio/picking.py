@@ -6,6 +6,7 @@ page's. A place is {"face": triangle, "barycentric": [a, b, c]}.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from typing import Any
@@ -152,4 +153,6 @@ def words_for(text: str) -> str:
     """Return a message with the words that the studio uses instead of landmarks' names."""
     for name in sorted(WORDS, key=len, reverse=True):
         text = text.replace(f"'{name}'", f"**{WORDS[name].label}**")
+        if "_" in name:                         # others are words: a chin may be spoken of
+            text = re.sub(rf"\b{name}\b", f"**{WORDS[name].label}**", text)
     return text[:1].upper() + text[1:]
