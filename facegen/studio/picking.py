@@ -7,7 +7,7 @@ page's. A place is {"face": triangle, "barycentric": [a, b, c]}.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Container, Iterable, Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -76,7 +76,7 @@ def wanted(work: AvatarWork, *, chosen: str | None = None, advised: str | None =
     return advised if advised in left else next(iter(left), None)
 
 
-def state(work: AvatarWork, name: str, proposed: Iterable[str] = ()) -> str:
+def state(work: AvatarWork, name: str, proposed: Container[str] = ()) -> str:
     """Return the state of a point. proposed: names that have a proposal."""
     if name in work.landmarks:
         return CONFIRMED
