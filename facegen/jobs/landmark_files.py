@@ -12,7 +12,8 @@ from facegen.fileio.avatar import load_avatar
 from facegen.fileio.images import check_image_path
 from facegen.fileio.textfile import check_place
 from facegen.jobs.landmark_preview import save_landmark_preview
-from facegen.landmarking.propose import Proposals, Proposer
+from facegen.landmarking.proposals import Proposals
+from facegen.landmarking.propose import Proposer
 from facegen.landmarking.write import save_landmarks
 from facegen.transfer.landmarks import check_places, load_landmarks
 from facegen.transfer.rig import avatar_path

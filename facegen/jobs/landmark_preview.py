@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from facegen.fileio.avatar import AvatarFile
 from facegen.fileio.images import check_image_path, contact_sheet, save_image
 from facegen.geometry.mesh import Mesh
-from facegen.landmarking.propose import Proposal, Proposals
+from facegen.landmarking.proposals import Proposal, Proposals
 from facegen.render.render import Renderer
 from facegen.transfer.alignment import Similarity
 

@@ -33,7 +33,7 @@ _DEEP = 110.0
 # Samples lie so much closer than pixels.
 _CLOSER = 1.4
 # So many places are looked at more closely.
-_BEST = 10
+_BEST = 8
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,7 +97,7 @@ def _look(column: NDArray, height: Array, depth: Array, scale: float, template: 
         rest = windows - (windows @ smooth) @ smooth.T
         size = np.linalg.norm(rest, axis=1)
         dot = rest @ template
-        score = np.where(good & (size > 0.25 * norm), dot / (np.maximum(size, 1e-300) * norm), -1.0)
+        score = np.where(good & (size > 0.25 * norm), dot / (np.maximum(size, 1e-6 * norm) * norm), -1.0)
         # a relief much stronger or weaker than a face's is none
         gain = dot / norm**2
         score = np.where((gain > 0.35) & (gain < 3.0), score, -1.0)

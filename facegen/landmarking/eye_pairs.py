@@ -21,9 +21,9 @@ _ALIKE, _OFF = 1.15, 0.5
 _APART = (2.05, 9.0)
 _BASE_APART = 57.8
 # Eyes do not tell which way up the head is: it is tried this many degrees apart.
-_TURN = 20.0
+_TURN = 30.0
 # So many pairs are looked at, the largest first.
-_MOST = 3
+_MOST = 2
 
 
 def eye_frames(surface: Surface, planes: Sequence[Plane]) -> list[Similarity]:

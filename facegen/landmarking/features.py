@@ -21,16 +21,23 @@ Array = NDArray[np.float64]
 
 # Millimetres of the base face to a pixel.
 _PIXEL = 0.4
-# What lies this much deeper than the lids' margin, mm, is behind it.
-_HOLLOW = 2.5
+# What lies this much deeper than the lids' margin, mm, is behind it; an opening is, mostly, this deep.
+_HOLLOW, _DEEP = 2.5, 4.0
 # An opening is one between these shares of the expected one's width.
 _WIDTHS = (0.5, 1.7)
 # It is no farther from where it is expected than this share of its width.
 _NEAR = 0.45
 # How much the normal's upward part jumps at the lips' line, in the middle; and what share of that is left at its ends.
 _JUMP, _ENDS = 0.6, 0.35
-# The lips' line is looked for within so many millimetres of where it is expected, and may climb so many pixels a column.
+# The lips' line is looked for within so many millimetres of where it is expected, and may climb so many pixels from
+# one column to the next.
 _BAND, _CLIMB = 11.0, 2
+
+
+# Lips are seen as a line, or open by no more than this share of the mouth's width.
+_OPEN = 0.35
+# The tip of the nose is the foremost place within so many millimetres of where it is expected.
+_TIP = 12.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,9 +83,11 @@ def view_of(skin: Surface, middle: Array, half: tuple[float, float], deep: float
 
 
 def eye_opening(skin: Surface, points: Mapping[str, Array], s: str) -> dict[str, Array]:
-    """Return the corners and middles of an eye's lids, name -> place (3,), from the opening between them; none where
-    there is none. skin: without the eyes; points: where they are expected; all in the base face's frame, mm. s: "L" or
-    "R"."""
+    """Return the outer corner and the middles of an eye's lids, name -> place (3,), from the opening between them; none
+    where there is none. The inner corner is not seen so well: skin fills it before the lids meet.
+
+    skin: without the eyes; points: where they are expected; all in the base face's frame, mm. s: "L" or "R".
+    """
     inner, outer, upper, lower = (points[f"eye_{name}_{s}"] for name in ("inner", "outer", "upper", "lower"))
     middle, wide = (inner + outer) / 2, float(np.linalg.norm(outer - inner))
     view = view_of(skin, middle, (1.1 * wide, 0.8 * wide))
@@ -101,13 +110,14 @@ def eye_opening(skin: Surface, points: Mapping[str, Array], s: str) -> dict[str,
     i, j = np.nonzero(label == best)
     opening = float(j.max() - j.min() + 1) * _PIXEL
     at = np.array([view.left + (j.mean() + 0.5) * _PIXEL, view.top - (i.mean() + 0.5) * _PIXEL])
+    below = np.where(view.ids < 0, np.inf, expected - view.depth)[i, j]
+    if np.median(below) < _DEEP:
+        return {}
     if not _WIDTHS[0] * wide < opening < _WIDTHS[1] * wide or np.linalg.norm(at - middle[:2]) > _NEAR * wide:
         return {}
     columns = np.unique(j)
-    ends = {0: (i[j == columns[0]], columns[0] - 1), 1: (i[j == columns[-1]], columns[-1] + 1)}
-    right, left = ("inner", "outer") if s == "L" else ("outer", "inner")
-    found = {f"eye_{right}_{s}": view.place(*_edge(view, round(float(ends[0][0].mean())), ends[0][1])),
-             f"eye_{left}_{s}": view.place(*_edge(view, round(float(ends[1][0].mean())), ends[1][1]))}
+    end, beside = (columns[-1], columns[-1] + 1) if s == "L" else (columns[0], columns[0] - 1)
+    found = {f"eye_outer_{s}": view.place(*_edge(view, round(float(i[j == end].mean())), beside))}
     column = round(float(j.min() + j.max()) / 2)
     rows = i[j == column]
     if len(rows):
@@ -156,10 +166,24 @@ def lip_line(skin: Surface, points: Mapping[str, Array]) -> dict[str, Array]:
             found[name] = view.place(*last)
     found["mouth_inner_top"] = view.place(*_edge(view, _shown_from(shown, start, j0, -1), j0))
     found["mouth_inner_bottom"] = view.place(*_edge(view, _shown_from(shown, start, j0, 1), j0))
+    found = {name: place for name, place in found.items()
+             if not name.startswith("mouth_inner") or abs(place[1] - view.place(start, j0)[1]) < _OPEN * wide}
     width = [abs(found[name][0] - middle[0]) for name in ("mouth_corner_L", "mouth_corner_R") if name in found]
     if len(width) < 2 or not _WIDTHS[0] * wide < sum(width) < _WIDTHS[1] * wide or min(width) < 0.5 * max(width):
         found = {name: at for name, at in found.items() if name.startswith("mouth_inner")}
     return {name: place for name, place in found.items() if np.isfinite(place).all()}
+
+
+def nose_tip(skin: Surface, points: Mapping[str, Array]) -> dict[str, Array]:
+    """Return the tip of the nose as name -> place (3,); none where the foremost place near it lies on a slope. As
+    `eye_opening`."""
+    view = view_of(skin, points["nose_tip"], (_TIP, _TIP))
+    if not (view.ids >= 0).any():
+        return {}
+    i, j = np.unravel_index(int(np.nanargmax(view.depth)), view.depth.shape)
+    if not 1 < i < len(view.ids) - 2 or not 1 < j < view.ids.shape[1] - 2:
+        return {}
+    return {"nose_tip": view.place(int(i), int(j))}
 
 
 def _between(shown: NDArray[np.bool_]) -> NDArray[np.bool_]:

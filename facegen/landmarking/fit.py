@@ -24,7 +24,7 @@ Array = NDArray[np.float64]
 _ALONG = 0.1
 # A landmark that is known counts as this many square millimetres of partners, times the stiffness' share.
 _HOLD = 4000.0
-# As a whole the face is laid by every third of its vertices, in so few ways.
+# As a whole the face is laid by every third of its vertices, in so few ways; bent, by every second.
 _EVERY, _FEW = 3, 24
 # Normals of a place and its partner agree at least so well.
 _LEAST_COSINE = 0.3
@@ -60,7 +60,8 @@ def lay(model: FaceModel, search: ClosestPoints, start: Similarity, known: Mappi
         rounds: tuple[Round, ...], bent: Array | None = None) -> Laid:
     """Return the face laid on a mesh. start: from its frame to the mesh's. known: name -> place (3,) on the mesh.
     bent (n, 3): where it starts, in its own frame, mm. As a whole (`WHOLE`) it needs few of its vertices and ways."""
-    some, few = (slice(None, None, _EVERY), _FEW) if rounds is WHOLE else (slice(None), model.ways.shape[1])
+    whole = rounds is WHOLE
+    some, few = slice(None, None, _EVERY if whole else _EVERY - 1), _FEW if whole else model.ways.shape[1]
     ways, stiffness, areas = model.ways[:, :few], model.stiffness[:few], model.areas[some]
     own_ways, at_start = ways[some], model.surface.vertices[some]
     frame = start

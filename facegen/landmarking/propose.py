@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 from itertools import product
 from typing import Any
@@ -19,33 +19,34 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from facegen.errors import InputError, nearest
-from facegen.face.landmarks import NAMES, REQUIRED
+from facegen.face.landmarks import NAMES
 from facegen.geometry.closest import ClosestPoints
 from facegen.geometry.mesh import Mesh
 from facegen.geometry.normals import vertex_normals
 from facegen.geometry.operators import Surface
+from facegen.landmarking.confidence import A_FACE, ENOUGH_TO_START, RECOGNISED, SEEN, belief, laid_share, sure
 from facegen.landmarking.detect import candidates
+from facegen.landmarking.doubts import not_recognised, odd_places
 from facegen.landmarking.eye_pairs import eye_frames
-from facegen.landmarking.features import eye_opening, lip_line
+from facegen.landmarking.features import eye_opening, lip_line, nose_tip
 from facegen.landmarking.fit import BENT, WHOLE, Laid, lay, likeness
 from facegen.landmarking.model import FaceModel, face_model
+from facegen.landmarking.proposals import ASKED, Proposal, Proposals
 from facegen.landmarking.symmetry import Plane, follow, symmetry_planes
 from facegen.transfer.alignment import Similarity, align
 from facegen.transfer.enclosure import sample_surface
-from facegen.transfer.landmark_checks import place_faults
-from facegen.transfer.landmarks import Landmarks
 from facegen.transfer.piece_names import INSIDE, kind_of_name
 from facegen.transfer.pieces import face_names, find_pieces
 from facegen.transfer.weld import weld
 
 Array = NDArray[np.float64]
 
+# Because squares and cubes of smaller and larger numbers run over, and the places of a mesh far off are rounded away.
+_SMALLEST, _LARGEST, _FARTHEST = 1e-12, 1e12, 1e6
 # Samples by which the planes of symmetry are found: about so many.
 _SAMPLES = 20_000
-# A laid face whose relief is as alike as this is a face; below the second it is none.
-_A_FACE, _NO_FACE = 0.65, 0.4
 # So many of the places found are followed to their end.
-_FOLLOWED = 3
+_FOLLOWED = 2
 # So many known places say where the face is, whatever was found without them.
 _ENOUGH = 4
 # A face found where its landmarks are farther from the known ones than this, in millimetres of the base face, is
@@ -56,73 +57,8 @@ _HEAD = 90.0
 _MIDDLE = np.array([0.0, -35.0, 0.0])
 # A mirrored place is trusted so far.
 _MIRRORED = 0.9
-# A face is recognised if it is this sure; else so many known places are asked for.
-_RECOGNISED, _ENOUGH_TO_START = 0.5, 6
-# A known place this far from where a recognised face has it, in distances between the outer corners of the eyes, is
-# astray.
-_ASTRAY = 0.3
-# The order in which places are best asked for: those that fix the face's place and size first.
-ASKED = ("eye_outer_L", "eye_outer_R", "nose_tip", "mouth_corner_L", "mouth_corner_R", "chin", "eye_inner_L",
-         "eye_inner_R", "eye_upper_L", "eye_upper_R", "eye_lower_L", "eye_lower_R", "mouth_inner_top",
-         "mouth_inner_bottom", "mouth_top", "mouth_bottom", "nose_bridge", "nose_wing_L", "nose_wing_R", "brow_inner_L",
-         "brow_inner_R", "brow_mid_L", "brow_mid_R", "brow_outer_L", "brow_outer_R")
-
-
-@dataclass(frozen=True, eq=False)
-class Proposal:
-    """A place for a landmark: on triangle ``face`` with ``barycentric`` (3,), at ``xyz`` (3,) in the mesh's axes and
-    units. ``confidence``: 0 to 1; ``why``: "given", "mirrored", "laid" and so on; ``given``: known before."""
-
-    name: str
-    face: int
-    barycentric: Array
-    xyz: Array
-    confidence: float
-    why: str
-
-    @property
-    def given(self) -> bool:
-        """Whether it was known, and is returned as it was."""
-        return self.why == "given"
-
-
-@dataclass(frozen=True, eq=False)
-class Proposals(Mapping[str, Proposal]):
-    """Name -> `Proposal`, in the order of the list of landmarks. ``face``: how surely there is a face, 0 to 1.
-    ``warnings``: a sentence each. ``ask``: the place to ask for next, or None when all required ones are known.
-    ``frame``: from the base face's axes and millimetres to the mesh's, or None where no face is."""
-
-    places: Mapping[str, Proposal]
-    face: float
-    warnings: tuple[str, ...] = ()
-    ask: str | None = None
-    frame: Similarity | None = None
-    mesh: Mesh | None = field(default=None, repr=False)
-
-    def __getitem__(self, name: str) -> Proposal:
-        return self.places[name]
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self.places)
-
-    def __len__(self) -> int:
-        return len(self.places)
-
-    def below(self, confidence: float) -> list[str]:
-        """Return the names of required places that are less sure than this."""
-        return [name for name in REQUIRED if name in self.places and self.places[name].confidence < confidence]
-
-    def is_worth(self, name: str, confidence: float) -> bool:
-        """Return whether a place is required, or as sure as this."""
-        return name in REQUIRED or self.places[name].confidence >= confidence
-
-    def landmarks(self) -> Landmarks:
-        """Return the places as the landmarks that a rig takes."""
-        faces = np.array([one.face for one in self.places.values()], np.int64)
-        return Landmarks(tuple(self.places), faces, self.mesh.faces[faces].astype(np.int64),
-                         np.array([one.barycentric for one in self.places.values()]).reshape(-1, 3))
-
-
+# The middles of the base face's eyeballs, mm.
+_BALLS = {"L": np.array([28.9, 0.0, 0.0]), "R": np.array([-28.9, 0.0, 0.0])}
 def propose_landmarks(mesh: Mesh | str | os.PathLike[str], known: Mapping[str, Any] | None = None) -> Proposals:
     """Return places for the landmarks of a mesh, given or read from a file, each with a confidence.
 
@@ -165,6 +101,11 @@ class Proposer:
         finite."""
         if not len(mesh.faces) or not np.isfinite(mesh.vertices).all():
             raise InputError("mesh: expected at least one triangle and finite vertices")
+        size = float(np.ptp(mesh.vertices[mesh.faces].reshape(-1, 3), axis=0).max())
+        if not _SMALLEST < size < _LARGEST or np.abs(mesh.vertices[mesh.faces]).max() > _FARTHEST * size:
+            raise InputError(f"mesh: spans {size:g} and lies up to {np.abs(mesh.vertices[mesh.faces]).max():g} from "
+                             f"the origin; expected {_SMALLEST:g} to {_LARGEST:g}, no farther off than {_FARTHEST:g} "
+                             "times that")
         self.mesh = mesh
         self._model: FaceModel = face_model()
         corners = mesh.vertices[mesh.faces]
@@ -174,6 +115,8 @@ class Proposer:
             raise InputError("mesh: none of its triangles has an area")
         self._surface = Surface(mesh.vertices, mesh.faces[self._solid])
         self._area = float(areas.sum())
+        self._plane_kept: tuple[Laid, Plane] | None = None
+        self._balls: dict[str, Array] = {}              # of recognised eyes, known with the skin
 
     # -- what does not depend on what is known -------------------------------------------------------------------------
     @cached_property
@@ -192,11 +135,17 @@ class Proposer:
     @cached_property
     def _start(self) -> tuple[Laid, float] | None:
         """The face laid where it is most alike, and how alike."""
-        search = self._all.search
-        frames = [one.frame for one in candidates(self._surface.corners, self._planes)]
-        frames += eye_frames(self._surface, self._planes)
+        found = self._followed([one.frame for one in candidates(self._surface.corners, self._planes)])
+        if found is None or found[1] < A_FACE:
+            more = self._followed(eye_frames(self._surface, self._planes))
+            found = max((one for one in (found, more) if one is not None), key=lambda one: one[1], default=None)
+        return found
+
+    def _followed(self, frames: list[Similarity]) -> tuple[Laid, float] | None:
+        """Return the face laid from the best of several frames, and how alike it is."""
         if not frames:
             return None
+        search = self._all.search
         whole = self._best_of(frames, _FOLLOWED)
         whole = self._best_of([frame for laid in whole for frame in (laid.frame, *_beside(laid.frame))], _FOLLOWED)
         bent = [lay(self._model, search, laid.frame, {}, BENT, laid.vertices) for laid in whole]
@@ -207,7 +156,7 @@ class Proposer:
     @cached_property
     def _skin(self) -> _Skin:
         """The skin, as the pieces of a recognised face tell it; else all that names do not exclude."""
-        if self._start is None or _sure(self._start[1]) < _RECOGNISED:
+        if self._start is None or sure(self._start[1]) < RECOGNISED:
             return self._all
         laid = self._start[0]
         frame = laid.frame.inverse()
@@ -218,6 +167,12 @@ class Proposer:
         except InputError:
             return self._all
         rows = np.concatenate([piece.faces for piece in pieces if piece.kind == "skin"])
+        for s in "LR":
+            eyes = [self.mesh.vertices[np.unique(self.mesh.faces[piece.faces])] for piece in pieces
+                    if piece.kind == f"eye_{s}"]
+            if eyes:
+                ball = max(eyes, key=lambda at: float(np.ptp(at, axis=0).max()))
+                self._balls[s] = (ball.min(axis=0) + ball.max(axis=0)) / 2
         return _Skin(self.mesh, np.intersect1d(rows, self._solid))
 
     @cached_property
@@ -231,7 +186,7 @@ class Proposer:
     def _finished(self, laid: Laid, alike: float, own: Mapping[str, Array]) -> _Found:
         """Return a laid face with what can be seen of it: laid again with that, in the middle of a recognised face."""
         model, search = self._model, self._skin.search
-        if _sure(alike) < _RECOGNISED and len(own) < _ENOUGH_TO_START:
+        if sure(alike) < RECOGNISED and len(own) < ENOUGH_TO_START:
             return _Found(laid, alike, {})
         seen = self._seen(laid)
         hold = {**{name: place for name, place in seen.items() if name in model.names}, **own}
@@ -245,7 +200,15 @@ class Proposer:
         back = frame.inverse()
         skin = Surface(back.apply(self.mesh.vertices), self._skin.surface.faces)
         points = dict(zip(self._model.names, self._model.placing @ laid.vertices, strict=True))
-        found = {**eye_opening(skin, points, "L"), **eye_opening(skin, points, "R"), **lip_line(skin, points)}
+        found = {**lip_line(skin, points), **nose_tip(skin, points)}
+        for s in "LR":
+            lids = [f"eye_{name}_{s}" for name in ("inner", "outer", "upper", "lower")]
+            if s in self._balls:                        # the eye is where its ball is, whatever else was laid
+                own = np.mean([points[name] for name in lids], axis=0)
+                base = np.mean([self._model.points[name] for name in lids], axis=0) - _BALLS[s]
+                off = back.apply(self._balls[s]) + base - own
+                points |= {name: points[name] + [*off[:2], 0.0] for name in lids}
+            found |= eye_opening(skin, points, s)
         return {name: frame.apply(place) for name, place in found.items()}
 
     def _best_of(self, frames: list[Similarity], count: int) -> list[Laid]:
@@ -258,7 +221,7 @@ class Proposer:
     @property
     def face(self) -> float:
         """How surely a face was found without any place known, 0 to 1."""
-        return 0.0 if self._start is None else _sure(self._start[1])
+        return 0.0 if self._start is None else sure(self._start[1])
 
     # -- what does -----------------------------------------------------------------------------------------------------
     def propose(self, known: Mapping[str, Any]) -> Proposals:
@@ -273,64 +236,26 @@ class Proposer:
         at = {name: one.xyz for name, one in given.items()}
         found = self._lay(at)
         laid = None if found is None else found.laid
-        sure = 0.0 if found is None else _sure(found.alike)
+        face = 0.0 if found is None else sure(found.alike)
+        believed = 0.0 if found is None else belief(found.alike, len(at))
         plane = self._plane_of(laid)
         places = dict(given)
         if laid is not None:
-            places |= {name: one for name, one in self._from(found, sure).items() if name not in given}
+            places |= {name: one for name, one in self._from(found, believed).items() if name not in given}
         for name, one in given.items():
             partner = f"{name[:-2]}_{'R' if name.endswith('L') else 'L'}"
             if name.endswith(("_L", "_R")) and partner not in given:
                 places[partner] = self._mirrored(partner, one, plane)
         ordered = {name: places[name] for name in NAMES if name in places}
         ask = next((name for name in ASKED if name not in given), None)
-        warnings = (*self._recognised(sure, given), *self._odd(given, laid, sure))
-        return Proposals(ordered, sure, warnings, ask, None if laid is None else laid.frame, self.mesh)
+        first = self._found
+        where = self._where(first.laid) if first is not None and first.alike >= A_FACE else None
+        warnings = (*not_recognised(face, given), *odd_places(given, self.mesh, where))
+        return Proposals(ordered, face, warnings, ask, None if laid is None else laid.frame, self.mesh)
 
-    def _recognised(self, sure: float, given: Mapping[str, Proposal]) -> list[str]:
-        """Return a warning if no face was recognised, with how many places to set."""
-        more = _ENOUGH_TO_START - len([name for name in given if name in ASKED])
-        if sure >= _RECOGNISED or more <= 0:
-            return []
-        missing = [name for name in ASKED if name not in given][:more]
-        return [f"no human face was recognised: the places are guesses; set {more} more, best {', '.join(missing)}, "
-                "and the others are proposed from those"]
-
-    def _odd(self, given: Mapping[str, Proposal], laid: Laid | None, sure: float) -> list[str]:
-        """Return what is odd about known places, a sentence each: see `place_faults`, and what lies astray where a
-        face was recognised without them."""
-        if not given:
-            return []
-        names = tuple(given)
-        faces = np.array([one.face for one in given.values()], np.int64)
-        weights = np.array([one.barycentric for one in given.values()])
-        errors, warnings = place_faults(names, self.mesh.faces[faces].astype(np.int64), weights, self.mesh)
-        found = self._found
-        if not errors and found is not None and _sure(found.alike) >= _RECOGNISED:
-            errors = self._astray(given, found.laid)
-        return [*errors, *warnings]
-
-    def _astray(self, given: Mapping[str, Proposal], laid: Laid) -> list[str]:
-        """Return which known places lie where a recognised face has another one, or none."""
-        where = dict(zip(self._model.names, laid.frame.apply(self._model.placing @ laid.vertices), strict=True))
-        unit = float(np.linalg.norm(where["eye_outer_L"] - where["eye_outer_R"]))
-        result = []
-        for name, one in given.items():
-            if name not in where:
-                continue
-            off = {other: float(np.linalg.norm(one.xyz - place)) / unit for other, place in where.items()}
-            if off[name] < _ASTRAY:
-                continue
-            near = min(off, key=off.get)
-            partner = f"{name[:-2]}_{'R' if name.endswith('L') else 'L'}"
-            if name.endswith(("_L", "_R")) and off[partner] < 0.5 * off[name]:
-                result.append(f"'{name}' lies on the side of '{partner}': _L is the subject's own left, on the right of "
-                              "a picture of the face")
-            elif off[near] < 0.5 * _ASTRAY:
-                result.append(f"'{name}' lies where '{near}' seems to be; is that meant?")
-            else:
-                result.append(f"'{name}' lies far from where it seems to be; is that meant?")
-        return result
+    def _where(self, laid: Laid) -> dict[str, Array]:
+        """Return name -> place (3,) of a laid face's landmarks, in the mesh's axes and units."""
+        return dict(zip(self._model.names, laid.frame.apply(self._model.placing @ laid.vertices), strict=True))
 
     def _given(self, name: str, place: Any) -> Proposal:
         """Return a known place as a proposal."""
@@ -361,8 +286,13 @@ class Proposer:
             return found
         tries = []
         if found is not None and self._agree(found.laid, own):
+            if sure(found.alike) >= RECOGNISED:           # what was seen of it stays: an answer at once
+                seen = {name: place for name, place in found.seen.items() if name not in own}
+                hold = {**{name: place for name, place in seen.items() if name in model.names}, **own}
+                laid = lay(model, search, found.laid.frame, hold, BENT[-4:], found.laid.vertices)
+                return _Found(laid, max(found.alike, likeness(model, laid, search)), seen)
             tries.append(lay(model, search, found.laid.frame, own, BENT[2:], found.laid.vertices))
-        if len(own) >= _ENOUGH and not (tries and _sure(found.alike) >= _RECOGNISED):
+        if len(own) >= _ENOUGH:
             try:
                 start = align({name: model.points[name] for name in own}, own)
             except InputError:                          # on one line: they fix no place
@@ -378,12 +308,12 @@ class Proposer:
 
     def _agree(self, laid: Laid, own: Mapping[str, Array]) -> bool:
         """Return whether known places lie where a laid face has them, by and large."""
-        where = dict(zip(self._model.names, laid.frame.apply(self._model.placing @ laid.vertices), strict=True))
+        where = self._where(laid)
         off = [float(np.linalg.norm(where[name] - place)) / laid.frame.scale for name, place in own.items()]
         return float(np.median(off)) < _ELSEWHERE
 
-    def _from(self, found: _Found, sure: float) -> dict[str, Proposal]:
-        """Return the places of a laid face's landmarks on the mesh."""
+    def _from(self, found: _Found, believed: float) -> dict[str, Proposal]:
+        """Return the places of a laid face's landmarks on the mesh. believed: how far, 0 to 1."""
         model, laid, skin = self._model, found.laid, self._skin
         x = laid.vertices
         normals = model.placing @ vertex_normals(x, model.surface.faces) @ laid.frame.rotation.T
@@ -398,17 +328,16 @@ class Proposer:
             saw = name in found.seen
             one = feet if feet.faces[i] >= 0 and not saw else other
             face, weights = int(skin.rows[one.faces[i]]), one.weights[i]
-            result[name] = Proposal(name, face, weights, one.points[i], float(sure * (1.0 if saw else weight[i])),
-                                    "seen" if saw else "laid")
+            share = SEEN if saw else laid_share(name) * min(float(weight[i]), 1.0)
+            result[name] = Proposal(name, face, weights, one.points[i], believed * share, "seen" if saw else "laid")
         return result
 
     def _plane_of(self, laid: Laid | None) -> Plane:
         """Return the plane of symmetry of the head with the laid face."""
         if laid is None:
             return self._planes[0]
-        key = id(laid)
-        if getattr(self, "_plane_key", None) == key:
-            return self._plane_kept
+        if self._plane_kept is not None and self._plane_kept[0] is laid:
+            return self._plane_kept[1]
         frame = laid.frame
         normal = frame.rotation[:, 0]
         middle = frame.apply(_MIDDLE)
@@ -418,7 +347,7 @@ class Proposer:
         if len(samples) > 20:
             some = samples[np.unique(np.linspace(0, len(samples) - 1, 1500).astype(int))]
             plane = follow(cKDTree(samples), some, plane, frame.scale * _HEAD, 8)
-        self._plane_key, self._plane_kept = key, plane
+        self._plane_kept = laid, plane
         return plane
 
     def _mirrored(self, name: str, one: Proposal, plane: Plane) -> Proposal:
@@ -439,17 +368,10 @@ class Proposer:
 
 
 def _beside(frame: Similarity) -> Iterator[Similarity]:
-    """Yield frames beside one: nodding, larger and smaller, higher and lower. A face that is laid a nose too high stays
-    there, because a brow is alike to a lip."""
-    for nod, size, up in product((-10.0, 0.0, 10.0), (0.9, 1.0, 1.1), (-12.0, 0.0, 12.0)):
-        if nod or size != 1.0 or up:
-            c, s = np.cos(np.radians(nod)), np.sin(np.radians(nod))
-            turn = frame.rotation @ np.array([[1.0, 0.0, 0.0], [0.0, c, -s], [0.0, s, c]])
+    """Yield frames beside one: larger and smaller, higher and lower. A face that is laid a nose too high stays there,
+    because a brow is alike to a lip."""
+    for size, up in product((0.9, 1.0, 1.1), (-12.0, 0.0, 12.0)):
+        if size != 1.0 or up:
             middle = frame.apply(_MIDDLE + np.array([0.0, up, 0.0]))
             scale = frame.scale * size
-            yield Similarity(scale, turn, middle - scale * turn @ _MIDDLE)
-
-
-def _sure(alike: float) -> float:
-    """Return how surely a relief that is so much alike is a face's."""
-    return float(np.clip((alike - _NO_FACE) / (_A_FACE - _NO_FACE), 0.0, 1.0))
+            yield Similarity(scale, frame.rotation, middle - scale * frame.rotation @ _MIDDLE)

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from facegen.fileio.textfile import save_text
-from facegen.landmarking.propose import Proposals
+from facegen.landmarking.proposals import Proposals
 
 # Decimals of barycentric weights: a ten-thousandth of a triangle's side would do.
 _DECIMALS = 6
