@@ -215,8 +215,7 @@ def _section(kind: Any, entry: Entry) -> Any:
     for name, one in entry.fields(optional=[each.name for each in fields(kind)]).items():
         usual = getattr(plain, name)
         if usual is None or isinstance(usual, str):
-            # As it is when new, which may be no text at all, or a text that Entry takes.
-            values[name] = usual if one.value == usual else one.text()
+            values[name] = usual if one.value == usual else one.text()      # "" and None where that is usual
         elif isinstance(usual, bool):
             values[name] = one.flag()
         elif isinstance(usual, float):
