@@ -16,6 +16,11 @@ class Handle:
         self.kind, self.removed, self._calls = kind, False, []
         self.__dict__.update(values)
 
+    def __setattr__(self, name: str, value: Any) -> None:
+        if self.__dict__.get("removed") and name != "removed":
+            raise RuntimeError(f"Cannot assign to '{name}' on a removed handle.")       # as viser does
+        super().__setattr__(name, value)
+
     def on_update(self, call):
         self._calls.append(call)
         return call

@@ -203,6 +203,7 @@ def test_regions_centre_and_axis_ride_on_the_face(opened):
 
 def test_a_face_is_changed_under_the_points(opened):
     page = shown(opened())
+    page.client.gui.find("Show centre O and the jaw's axis").enter(True)
     drag(page, "brow_mid_L", [0.0, 3.0, 0.0])
     page.change("1986", face=FaceWork(rig="akimoto-1986", raw=page.work.face.raw, units={"12": 0.5}))
     assert len(grips(page).batched_positions) == 15
