@@ -119,9 +119,8 @@ def controls_of(work: FaceWork, face: Face, person: Person | None) -> Controls:
 
 def strangers(raw: Raw, face: Face) -> tuple[str, ...]:
     """Return the feature points in raw data that a face has not, or that take no vector there."""
-    known = {name for name, takes in zip(face.feature_points, face.takes_input, strict=True) if takes}
-    known |= {alias for name, alias in face.paper_names.items() if name in known}
-    return tuple(name for name in deformation_of(raw).points if name not in known)
+    found = deformation_of(raw)
+    return tuple(name for name in found.points if name not in face.possible(found).points)
 
 
 def with_own_names(raw: Raw, face: Face) -> Raw:
