@@ -56,19 +56,27 @@ def avatar_names() -> tuple[str, ...]:
     return tuple(_shipped())
 
 
-def avatar_files(avatar: str | Path, landmarks: str | Path | None, *, what: str = "avatar") -> tuple[Path, Path]:
-    """Return the file of an avatar, given by path or a shipped one by name, and that of its landmarks. ``what`` it is
-    called in errors. Raises InputError or FileError."""
+def avatar_path(avatar: str | Path, *, what: str = "avatar") -> Path:
+    """Return the file of an avatar, given by path or a shipped one by name. ``what`` it is called in errors. Raises
+    FileError."""
     path = _shipped().get(str(avatar), Path(avatar))
     if not path.exists():
         named = f", or one of {', '.join(_shipped())}" if path.suffix == "" else ""
         raise FileError(f"{what}: expected a file{named}, got {str(avatar)!r}, which does not exist"
                         f"{nearest(str(avatar), _shipped())}")
+    return path
+
+
+def avatar_files(avatar: str | Path, landmarks: str | Path | None, *, what: str = "avatar") -> tuple[Path, Path]:
+    """Return the file of an avatar, given by path or a shipped one by name, and that of its landmarks. ``what`` it is
+    called in errors. Raises InputError or FileError."""
+    path = avatar_path(avatar, what=what)
     marks = Path(landmarks) if landmarks is not None else path.with_name("landmarks.yaml") \
         if str(avatar) in _shipped() else None
     if marks is None:
-        raise InputError(f"landmarks: expected the file of the {what}'s landmarks, got none; write one with the places "
-                         f"of eyes, brows, nose, mouth and chin on {path.name} (docs/landmarks.md lists the names)")
+        raise InputError(f"landmarks: expected the file of the {what}'s landmarks, got none; 'facegen "
+                         f"landmarks {path.name} -o {path.stem}.yaml' proposes them, to be looked at "
+                         "(docs/landmarks.md lists the names)")
     return path, marks
 
 
