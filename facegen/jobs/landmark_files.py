@@ -18,8 +18,8 @@ from facegen.landmarking.write import save_landmarks
 from facegen.transfer.landmarks import check_places, load_landmarks
 from facegen.transfer.rig import avatar_path
 
-# Below this a place is to be looked at: of places this sure one in ten is off by more than a tenth of the distance
-# between the outer corners of the eyes.
+# Below this a place is to be looked at: of those with 0.2 to 0.4 half are off by more than a twentieth of the distance
+# between the outer corners of the eyes (docs/landmarks.md).
 UNSURE = 0.5
 
 

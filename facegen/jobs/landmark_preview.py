@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from facegen.face.landmarks import REQUIRED
 from facegen.fileio.avatar import AvatarFile
 from facegen.fileio.images import check_image_path, contact_sheet, save_image
 from facegen.geometry.mesh import Mesh
@@ -21,6 +22,8 @@ _GIVEN, _UNSURE, _HALF, _SURE = (40, 90, 230), (215, 40, 40), (235, 165, 20), (2
 # Millimetres of the base face round the face's middle that are shown, and in how much more detail than a point.
 _AROUND = 105.0
 _MIDDLE = np.array([0.0, -32.0, 0.0])
+# Names stand in two columns, this share of the picture beside the middle, so many pixels apart.
+_COLUMN, _LINE = 0.3, 12
 # A place whose surface looks away from the viewer by more than this is not drawn: it is on the other side.
 _AWAY = -0.15
 
@@ -60,7 +63,9 @@ def _marked(renderer: Renderer, mesh: Mesh, found: Proposals, frame: Similarity)
     camera = renderer.camera
     radius = max(2.0, camera.width / 200)
     taken: list[tuple[float, float]] = []
-    for name, one in sorted(found.items(), key=lambda item: item[1].confidence):
+    middle = camera.project((mesh.vertices.mean(axis=0) if found.frame is None else _MIDDLE)[None])[0, 0]
+    height = {name: frame.inverse().apply(one.xyz) @ camera.rotation[1] for name, one in found.items()}
+    for name, one in sorted(found.items(), key=lambda item: -height[item[0]]):
         normal = _normal(one, mesh)
         if normal @ camera.rotation[2] < _AWAY:
             continue
@@ -68,11 +73,14 @@ def _marked(renderer: Renderer, mesh: Mesh, found: Proposals, frame: Similarity)
         x, y, _ = camera.project(at[None])[0]
         colour = colour_of(one)
         draw.ellipse([x - radius, y - radius, x + radius, y + radius], fill=colour, outline=(255, 255, 255))
-        side = 1 if normal @ camera.rotation[0] >= 0 else -1
-        label = (x + side * 2 * radius, y)
-        while any(abs(label[1] - v) < 10 and abs(label[0] - u) < 60 for u, v in taken):
-            label = (label[0], label[1] + 5)
+        if name not in REQUIRED:
+            continue
+        side = 1 if x >= middle else -1
+        label = (middle + side * _COLUMN * camera.width, y)
+        while any(abs(label[1] - v) < _LINE and label[0] == u for u, v in taken):
+            label = (label[0], label[1] + 1)
         taken.append(label)
+        draw.line([x + side * radius, y, label[0] - side * 3, label[1]], fill=(*colour, 120))
         draw.text(label, name, fill=colour, anchor="lm" if side > 0 else "rm", stroke_width=1,
                   stroke_fill=(255, 255, 255))
     return np.asarray(picture)

@@ -1,5 +1,5 @@
 """How sure a proposed place is. Calibrated by benchmarks/landmarks.py on heads of several authors: of places with a
-confidence c, about the share c lies within a twentieth of the distance between the outer corners of the eyes."""
+confidence c, the share c or more lies within a twentieth of the distance between the outer corners of the eyes."""
 
 from __future__ import annotations
 

@@ -88,11 +88,13 @@ class _Skin:
 
 @dataclass(frozen=True, eq=False)
 class _Found:
-    """A face ``laid`` on the mesh, how ``alike`` it is, and what of it is ``seen``, name -> place (3,)."""
+    """A face ``laid`` on the mesh, how ``alike`` it is, what of it is ``seen``, name -> place (3,), and by what it is
+    ``held`` beside known places: what is seen, and lids that are where their eyeballs are."""
 
     laid: Laid
     alike: float
     seen: Mapping[str, Array]
+    held: Mapping[str, Array]
 
 
 class Proposer:
@@ -189,7 +191,7 @@ class Proposer:
         """Return a laid face with what can be seen of it: laid again with that, in the middle of a recognised face."""
         model, search = self._model, self._skin.search
         if sure(alike) < RECOGNISED and len(own) < ENOUGH_TO_START:
-            return _Found(laid, alike, {})
+            return _Found(laid, alike, {}, {})
         lids = self._at_balls(laid)
         if lids:
             laid = lay(model, search, laid.frame, {**lids, **own}, BENT[2:], laid.vertices)
@@ -197,7 +199,7 @@ class Proposer:
         hold = {**lids, **{name: place for name, place in seen.items() if name in model.names}, **own}
         again = lay(model, search, laid.frame, hold, BENT[-4:], laid.vertices)
         seen = {name: place for name, place in self._seen(again).items() if name not in own}
-        return _Found(again, max(alike, likeness(model, again, search)), seen)
+        return _Found(again, max(alike, likeness(model, again, search)), seen, hold)
 
     def _at_balls(self, laid: Laid) -> dict[str, Array]:
         """Return the lids, name -> place (3,) on the mesh, where eyeballs lie elsewhere than the laid face has them."""
@@ -303,9 +305,9 @@ class Proposer:
         if found is not None and self._agree(found.laid, own):
             if sure(found.alike) >= RECOGNISED:           # what was seen of it stays: an answer at once
                 seen = {name: place for name, place in found.seen.items() if name not in own}
-                hold = {**{name: place for name, place in seen.items() if name in model.names}, **own}
+                hold = {**found.held, **own}
                 laid = lay(model, search, found.laid.frame, hold, BENT[-4:], found.laid.vertices)
-                return _Found(laid, max(found.alike, likeness(model, laid, search)), seen)
+                return _Found(laid, max(found.alike, likeness(model, laid, search)), seen, hold)
             tries.append(lay(model, search, found.laid.frame, own, BENT[2:], found.laid.vertices))
         if len(own) >= _ENOUGH:
             try:
