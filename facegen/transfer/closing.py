@@ -44,6 +44,8 @@ _SHUT, _SHUT_MM = 0.06, 0.3
 _ON_THE_BALL = 1.25
 # What moves over this share of the radius is lifted out of the eye, by this share: a rim may lie in the ball at rest.
 _LIFTED, _OUT = 0.15, 0.02
+# Millimetres: a step of this size lifts by half; a smaller one mends what the transfer has laid there well.
+_MENDS = 0.3
 # The middle of a triangle with sides s lies nearer to the eye than its corners: sqrt(1 - s^2 / 3), at most so much.
 _MOST_SAG = 0.3
 # Sides up to the first of these, in radii, are as long as their mean; from the second on the longest decides.
@@ -208,7 +210,7 @@ class _Lid:
         rows = changed[on]
         wanted[on] = np.maximum(self._home[rows], self._over(unit, rows) - self._sunk[rows])
         radius = np.linalg.norm(now[changed], axis=1)
-        radius = radius + _beyond(step[changed]) * lift * np.maximum(wanted - radius, 0.0)
+        radius = radius + _beyond(step[changed], _MENDS) * lift * np.maximum(wanted - radius, 0.0)
         return changed, (radius[:, None] * unit[changed]) @ ball.shape + ball.centre
 
     def _over(self, unit: Array, rows: NDArray) -> Array:
