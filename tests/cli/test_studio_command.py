@@ -48,11 +48,11 @@ def start(tmp_path):
 
 def test_it_serves_until_ctrl_c(start, tmp_path):
     process, url = start()
-    with urllib.request.urlopen(url, timeout=20) as page:
+    with urllib.request.urlopen(url, timeout=120) as page:
         assert b"<title>facegen studio</title>" in page.read()
         assert re.fullmatch(re.escape(url) + r"w/[\w-]{32}", page.url)
     process.send_signal(signal.SIGINT)
-    out, err = process.communicate(timeout=30)
+    out, err = process.communicate(timeout=120)
     assert process.returncode == 0
     assert out == ""
     assert "stopped; every work is saved" in err
@@ -65,11 +65,11 @@ def test_a_token_is_asked_for_and_an_end_that_the_system_asks_for_saves_too(star
     process, url = start("--port", 0, FACEGEN_STUDIO_TOKEN="open-sesame-1")
     assert url.endswith("?token=open-sesame-1")
     with pytest.raises(urllib.error.HTTPError) as refused:
-        urllib.request.urlopen(url.partition("?")[0], timeout=20)
+        urllib.request.urlopen(url.partition("?")[0], timeout=120)
     assert refused.value.code == 403
     assert "the one with ?token=" in refused.value.read().decode()
     process.send_signal(signal.SIGTERM)
-    assert "every work is saved" in process.communicate(timeout=30)[1]
+    assert "every work is saved" in process.communicate(timeout=120)[1]
     assert process.returncode == 0
 
 
