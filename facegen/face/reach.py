@@ -45,9 +45,11 @@ def movable_points(face: Face) -> tuple[str, ...]:
 
 
 class Grip:
-    """One feature point of a face, held. mirrored: the point on the other side goes along as its mirror image.
+    """One feature point of a face, held; ``row``: its place among them.
 
-    A point in the middle, mirrored, stays there. Raises InputError for a point that is none or takes no vector.
+    mirrored: the point on the other side goes along as its mirror image.
+
+    A point in the middle then stays there. Raises InputError for a point that is none or takes no vector.
     """
 
     def __init__(self, face: Face, point: str, *, mirrored: bool = False, detail: int = 2) -> None:
@@ -59,10 +61,10 @@ class Grip:
         other = mirror_name(point)
         self.point = point
         self.other = other if mirrored and other in movable else None
-        self._row = names.index(point)
+        self.row = names.index(point)
         self._other = names.index(self.other) if self.other else None
         self._middle = self.other == point
-        weights = face.point_weights(detail)[[self._row]]
+        weights = face.point_weights(detail)[[self.row]]
         order = np.argsort(weights.indices)
         self._weights = weights.data[order]
         self._posed = face.some_posed(weights.indices[order].astype(np.int64), detail=detail)
@@ -71,7 +73,7 @@ class Grip:
         """Return where the point lies (k, 3), mm, with vectors (k, 3) of its own beside what ``controls`` have."""
         vectors = np.atleast_2d(np.asarray(vectors, np.float64))
         many = np.repeat(controls.vectors[None], len(vectors), axis=0)
-        many[:, self._row] += vectors
+        many[:, self.row] += vectors
         if self._other is not None and not self._middle:
             many[:, self._other] += vectors * [-1.0, 1.0, 1.0]
         rest = {name: np.repeat(getattr(controls, name)[None], len(vectors), axis=0)

@@ -76,9 +76,10 @@ class Figure:
             handle.opacity = opacity
 
     def remove(self) -> None:
-        """Take it from the scene."""
+        """Take it from the scene; what is asked of it afterwards does nothing."""
         for handle, _ in self._handles:
             handle.remove()
+        self._handles = []
 
     def pick(self, origin: ArrayLike, direction: ArrayLike) -> Hit | None:
         """Return the place that a ray of the scene meets first, on the vertices last shown."""

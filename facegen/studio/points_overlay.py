@@ -60,6 +60,7 @@ class PointsOverlay:
         self._inner: list[tuple[Any, Array]] = []
         self._chosen: str | None = None
         self._moved: frozenset[str] = frozenset()
+        self._marked: Any = None
         self._rigid = self._skull()
 
     def places(self, vertices: Array | None = None) -> dict[str, Array]:
@@ -106,8 +107,9 @@ class PointsOverlay:
     def choose(self, name: str | None, moved: frozenset[str], said: str = "") -> None:
         """Mark a point with its name, and those that were moved by hand."""
         with self._lock:
-            if (name, moved, said) == (self._chosen, self._moved, getattr(self._label, "text", "")):
+            if (name, moved, said, self._points is None) == self._marked:
                 return
+            self._marked = name, moved, said, self._points is None
             self._chosen, self._moved = name, moved
             if self._label is not None:
                 self._label.remove()

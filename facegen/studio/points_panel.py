@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -172,9 +173,9 @@ class PointsPanel:
     def _from_rest(self, work: Work, point: str) -> float:
         face = self._face
         person = self.page.person()
-        grip = Grip(face, point)
-        rest = face.feature_point_places(face.mesh().vertices)[point]
-        return float(np.linalg.norm(grip.places(raws.controls_of(work.face, face, person), np.zeros(3))[0] - rest))
+        grip = _grip(face, point)
+        rest = face.point_weights()[[grip.row]] @ face.mesh().vertices
+        return float(np.linalg.norm(grip.places(raws.controls_of(work.face, face, person), np.zeros(3)) - rest))
 
     # -- points -------------------------------------------------------------------------------------------------
     def _choose(self, point: str | None) -> None:
@@ -290,6 +291,11 @@ def said(point: str, face: Face) -> str:
             words = words.removesuffix(end) + side
     paper = face.paper_names.get(point)
     return words[0].upper() + words[1:] + (f" ({paper})" if paper else "")
+
+
+@lru_cache(maxsize=8)
+def _grip(face: Face, point: str) -> Grip:
+    return Grip(face, point)
 
 
 def read_raw(name: str, content: bytes) -> raws.Raw:

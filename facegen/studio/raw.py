@@ -62,9 +62,8 @@ def with_vector(raw: Raw, face: Face, point: str, vector: ArrayLike, *, mirrored
     return _plain(replace(found, points=points))
 
 
-def number_of(raw: Raw, face: Face | None, kind: str, key: str) -> float:
-    """Return a number of jaw, lids, eyes or head: mm (on a face), degrees or a share."""
-    found = deformation_of(raw)
+def number_of(found: Deformation, face: Face | None, kind: str, key: str) -> float:
+    """Return a number of jaw, lids, eyes or head of raw data: mm (on a face), degrees or a share."""
     value = getattr(found, kind).get(key, 0.0)
     if (kind, key) in _LENGTHS and face is not None and value:
         one = face.total(Deformation(**{kind: {key: value}}, units=found.units))

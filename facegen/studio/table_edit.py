@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import cache
 from typing import Any
 
 from facegen.blendshapes.recipes import half
@@ -56,11 +57,15 @@ def file_name(name: str) -> str:
 # -- expressions ------------------------------------------------------------------------------------------------------
 def recipes(data: Data) -> dict[str, Recipe]:
     """Return name -> recipe of every expression, the person's in place of the common ones."""
-    found = {name: Recipe(name, canonical(one.units), one.about, False)
-             for name, one in load_expressions().expressions.items()}
     person = person_from_data({**new_table("x"), **data, "aliases": data.get("aliases") or {}})
-    return found | {name: Recipe(name, canonical(one.units), one.about, True)
-                    for name, one in person.expressions.items()}
+    return _common() | {name: Recipe(name, canonical(one.units), one.about, True)
+                        for name, one in person.expressions.items()}
+
+
+@cache
+def _common() -> dict[str, Recipe]:
+    return {name: Recipe(name, canonical(one.units), one.about, False)
+            for name, one in load_expressions().expressions.items()}
 
 
 def with_recipe(data: Data, name: str, units: str, about: str) -> dict[str, Any]:

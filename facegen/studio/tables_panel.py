@@ -32,6 +32,8 @@ class TablesPanel:
         self.page = page
         self._several = Several(page)
         self._recipe_shown: edit.Recipe | None = None
+        self._seen: Any = None                  # what was shown last
+        self._saved = 0                         # times that a table was saved
         self._drawn: Any = None                 # what the several faces show
         self._task: Task | None = None
         gui, calls = page.client.gui, page.calls
@@ -82,9 +84,14 @@ class TablesPanel:
     # -- showing ------------------------------------------------------------------------------------------------
     def refresh(self, work: Work) -> None:
         """Show a work."""
-        table, desk = work.table, self.page.desk
+        table, names = work.table, self.page.desk.face_names(self.page.name)
+        self._several.keep()
+        now = (table, names, self.page.desk.people(self.page.name), self._expression.value, self._unit.value,
+               self._scale.value, self._saved)
+        if now == self._seen:               # something else was changed, which may be a slider that is dragged
+            return
         self._whose.refresh(table)
-        set_options(self._third, (_NONE, *(name for name in desk.face_names(self.page.name) if name not in _FACES)))
+        set_options(self._third, (_NONE, *(name for name in names if name not in _FACES)))
         found = edit.recipes(table.data)
         set_options(self._expression, tuple(sorted(found, key=lambda name: (not found[name].own, name))), _FIRST)
         self._recipe_of(found)
@@ -96,7 +103,7 @@ class TablesPanel:
                        self._save):
             handle.disabled = table.file is None
         self._state.content = self._whose.state
-        self._several.keep()
+        self._seen = (*now[:3], self._expression.value, self._unit.value, self._scale.value, self._saved)
         self._draw()
 
     def close(self) -> None:
@@ -243,6 +250,7 @@ class TablesPanel:
         def saved() -> None:
             modal.close()
             change.save()
+            self._saved += 1
             self.page.show_face()
             self.page.refresh()
             self._drawn = None

@@ -146,3 +146,8 @@ def test_a_work_that_cannot_be_saved_is_told(tmp_path):
 def test_a_section_checks_itself():
     with pytest.raises(InputError, match="no unit"):
         FaceWork(units={"99": 1.0}).checked()
+
+
+def test_a_new_work_comes_back():
+    """Every section as it is before anything is chosen: texts that are empty, what is None."""
+    assert Work.read(json.loads(json.dumps(Work().plain()))) == Work()

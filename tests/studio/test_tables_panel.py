@@ -43,7 +43,8 @@ def wait(page):
 
 def save(page):
     find(page, "Save ...").press()
-    [one for one in page.client.gui.made if getattr(one, "label", "") == "Save this"][-1].press()      # of the window opened last
+    asked = [one for one in page.client.gui.made if getattr(one, "label", "") == "Save this"]
+    asked[-1].press()                               # in the window that opened last
 
 
 def test_from_a_new_person_to_a_file_that_everything_reads(page, tmp_path):
@@ -64,7 +65,7 @@ def test_from_a_new_person_to_a_file_that_everything_reads(page, tmp_path):
     assert not path.exists()
     save(page)
     person = load_person(path)
-    assert (person.name, person.units["4"].scale) == ("Ada", 0.5)
+    assert (person.name, person.units["L4"].scale) == ("Ada", 0.5)
     assert set(person.expressions["happiness"].units) == {"6", "L12"}
     assert page.desk.people("work")[-1] == "ada.yaml"
     page.change("person", face=FaceWork(units={"4": 1.0}, person="ada.yaml"))
