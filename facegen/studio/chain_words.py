@@ -36,5 +36,5 @@ def _lines(data: Mapping[str, Any], shares: Mapping[str, float]) -> Iterator[str
     if data["own"]:
         yield f"\n{data['person']} moves otherwise than others: {', '.join(data['own'])}"
     title, *rest = movement_lines(data)
-    yield f"\n**{title.partition(',')[0]}**{title.partition('(')[1]}{title.partition('(')[2]}\n"
+    yield f"\n**{title.partition(',')[0]}** {title.partition('(')[1]}{title.partition('(')[2]}\n"
     yield "```\n" + "\n".join(line.removeprefix("  ").replace("```", "") for line in rest) + "\n```"

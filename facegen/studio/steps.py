@@ -28,7 +28,7 @@ button:has(.fg-thumb) .mantine-Button-section * { width: 100%; height: auto; mar
 button:has(.fg-thumb) .mantine-Button-label { display: block; font-size: 10px; line-height: 12px; height: 26px;
   padding: 1px 2px; color: #333; font-weight: 450; white-space: normal; overflow: hidden; text-align: center; }
 .fg-thumb { display: block; width: 100%; height: auto; aspect-ratio: 1; background: #ececec; }
-pre, pre code { white-space: pre-wrap; }
+pre, pre code { white-space: pre-wrap; font-size: 10px !important; letter-spacing: -0.2px; }
 button:has(.fg-on) { outline: 2px solid #b05c48; outline-offset: -1px; }
 </style>"""
 
