@@ -28,8 +28,8 @@ from facegen.forked import for_each
 
 # Because quantised steps must not be seen: half a step is at most this share of the avatar's size.
 _COARSEST_ERROR = 2.5e-4
-# Shapes whose normals are made by one process at a time.
-_AT_A_TIME = 8
+# Triangles whose normals are made by one process at a time: fewer are not worth another one.
+_AT_A_TIME = 150_000
 
 
 @dataclass(eq=False)
@@ -270,14 +270,14 @@ class _Writer:
         moving = {name: found for name in names
                   if (found := [(first, use.motions[key[0]][name]) for key, first in starts.items()
                                 if name in use.motions[key[0]]])}
-        shapes = list(moving.values())
+        shapes, each = list(moving.values()), max(1, _AT_A_TIME // max(sum(map(len, faces)), 1))
 
         def work(i: int) -> list[tuple[NDArray, NDArray]]:
             return [surface.change(np.concatenate([first + motion.rows for first, motion in shape]),
                                    np.concatenate([motion.values for _, motion in shape]))
-                    for shape in shapes[i * _AT_A_TIME:(i + 1) * _AT_A_TIME]]
+                    for shape in shapes[i * each:(i + 1) * each]]
 
-        changes = itertools.chain.from_iterable(for_each(-(-len(shapes) // _AT_A_TIME), work))
+        changes = itertools.chain.from_iterable(for_each(-(-len(shapes) // each), work))
         result = {}
         for name, (rows, change) in zip(moving, changes, strict=True):
             for (key, first), end in zip(starts.items(), ends, strict=True):

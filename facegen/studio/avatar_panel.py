@@ -43,6 +43,7 @@ class AvatarPanel:
         self.page = page
         self.folder = page.desk.store.folder_of(page.name)
         self.scene = AvatarScene(page)
+        self._last: AvatarWork | None = None        # what is shown
         gui = page.client.gui
         with gui.add_folder("1 Avatar") as self._first:
             self._make_open(gui)
@@ -88,10 +89,17 @@ class AvatarPanel:
     # -- what is shown ------------------------------------------------------------------------------------------
     def refresh(self, work: Work) -> None:
         """Show a work."""
-        avatar = work.avatar
-        if self.scene.open(avatar):
-            self.picker.forget()
-            self.rigging.forget()
+        if work.avatar is not self._last:           # a slider of the face that is dragged changes nothing of this
+            self._last = work.avatar
+            if self.scene.open(work.avatar):
+                self.picker.forget()
+                self.rigging.forget()
+        self._refresh_file(work.avatar)
+        self.scene.show(work.avatar, bool(self._seen.value) and not self.rigging.compares)
+        self.picker.refresh(work)
+        self.rigging.refresh(work)
+
+    def _refresh_file(self, avatar: AvatarWork) -> None:
         opened = self.scene.opened
         self._about.content = opened.summary if opened else _HELP
         self._ours.value = avatar.file if avatar.file in avatar_names() else _NONE
@@ -100,9 +108,11 @@ class AvatarPanel:
         for handle in (self._seen, self._axes):
             handle.visible = opened is not None
         self._save.disabled = self._clear.disabled = not avatar.landmarks
-        self.scene.show(avatar, bool(self._seen.value) and not self.rigging.compares)
-        self.picker.refresh(work)
-        self.rigging.refresh(work)
+
+    def _again(self) -> None:
+        """Read the avatar again: its file has changed."""
+        self._last = None
+        self.refresh(self.page.work)
 
     # -- step 1 -------------------------------------------------------------------------------------------------
     def _on_shelf(self) -> tuple[str, ...]:
@@ -113,7 +123,7 @@ class AvatarPanel:
         if given.name.lower().endswith(COLOURS):
             self.scene.mesh                                 # noqa: B018 - told if there is no avatar yet
             keep_colours(self.folder, self.scene.opened, given.name, given.content)
-            self.refresh(self.page.work)
+            self._again()
         else:
             self._read(given.name, lambda: keep(self.folder, given.name, given.content))
 
@@ -143,7 +153,7 @@ class AvatarPanel:
         keeps = self.page.work.avatar
         fresh = AvatarWork(file=name, symmetric=keeps.symmetric, sets=keeps.sets)
         self.page.change(f"open {name}", avatar=self._facing(fresh))
-        self.refresh(self.page.work)                        # the same name may be another file
+        self._again()                                       # the same name may be another file
         colours = lost_colours(self.scene.opened)
         if colours is not None:
             self.page.say(f"They are in {colours}: open that file too.", "Colours are missing")

@@ -2,17 +2,23 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
 from facegen.face.chain import chain
 from facegen.facs.deformation import deformation_from_dict
+from facegen.facs.expressions import Resolution
 from facegen.facs.yamlfile import parse_yaml
+from facegen.facs.yamltext import yaml_text
 from facegen.studio.chain_words import chain_markdown
+from facegen.studio.latest import Latest
 from facegen.studio.page import Page
 from facegen.studio.text_box import TextBox
 from facegen.studio.work import Work
+
+_PAUSE = 0.15           # seconds from text to text
 
 
 def read_raw(text: str) -> Mapping[str, Any]:
@@ -23,9 +29,7 @@ def read_raw(text: str) -> Mapping[str, Any]:
 
 def write_raw(raw: Mapping[str, Any]) -> str:
     """Return raw movements as the text that `read_raw` takes."""
-    import yaml
-
-    return yaml.safe_dump(dict(raw), sort_keys=False, default_flow_style=None, width=60).strip() if raw else ""
+    return yaml_text(raw).strip() if raw else ""
 
 
 class ChainView:
@@ -34,6 +38,7 @@ class ChainView:
     def __init__(self, page: Page) -> None:
         self._page = page
         self._shown: tuple[Any, ...] | None = None
+        self._words = Latest("chain", page.fault)
         gui = page.client.gui
         with gui.add_folder("From name to movement", expand_by_default=False):
             self._text = gui.add_markdown("")
@@ -51,8 +56,15 @@ class ChainView:
         """Show a work."""
         face, rig = work.face, self._page.rig
         self._raw.refresh(dict(face.raw))
-        meaning = self._page.meaning()
-        now = meaning, dict(face.blend), rig
+        now = self._page.meaning(), dict(face.blend), rig
         if now != self._shown:
             self._shown = now
-            self._text.content = chain_markdown(chain(meaning, rig, face.person), face.blend)
+            self._words.ask(lambda: self._say(*now, face.person))
+
+    def _say(self, meaning: Resolution, shares: Mapping[str, float], rig: Any, person: str | None) -> None:
+        self._text.content = chain_markdown(chain(meaning, rig, person), shares)
+        time.sleep(_PAUSE)          # nobody reads faster, and a drag goes on
+
+    def close(self) -> None:
+        """End its thread."""
+        self._words.close()

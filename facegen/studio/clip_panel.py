@@ -56,7 +56,7 @@ class ClipPanel:
         self._help = gui.add_markdown(_HELP)
         self._wrong = gui.add_markdown("", visible=False)
         self._picture = gui.add_html("")
-        self._time = gui.add_slider("Time (s)", 0.0, timeline.NEW_LENGTH, _STEP, 0.0,
+        self._time = gui.add_slider("Time (s)", 0.0, timeline.NEW_LENGTH, _STEP, 0.0, marks=(),
                                     hint="Drag to see any moment. Keys are set at this time.")
         self._time.on_update(calls(lambda: self.seek(self._time.value)))
         self._play = gui.add_button("Play", hint="Or press Ctrl and the space bar.")
@@ -64,7 +64,8 @@ class ClipPanel:
         gui.add_command("Play or pause", hotkey="space", modifier="cmd/ctrl").on_trigger(calls(self._play_or_pause))
         self._told_rate = gui.add_markdown("")
         with gui.add_folder("How it plays", expand_by_default=False):
-            self._speed = gui.add_slider("Speed", *SPEED, 0.05, clip.speed, hint="1 is as it is. Sound plays at 1.")
+            self._speed = gui.add_slider("Speed", *SPEED, 0.05, clip.speed, marks=(),
+                                         hint="1 is as it is. Sound plays at 1 only.")
             self._speed.on_update(calls(self._other_way))
             self._loop = gui.add_checkbox("Round and round", clip.loop)
             self._loop.on_update(calls(self._other_way))

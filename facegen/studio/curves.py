@@ -59,7 +59,7 @@ def _by_unit(weights: Mapping[str, float]) -> dict[str, float]:
 
 
 def unit_label(code: str) -> str:
-    """Return a unit as a person reads it: "Lip corner puller (12), left"."""
+    """Return a unit as a person reads it: "Lip corners up (12), left"."""
     mark, number = split_code(code)
     side = {"L": ", left", "R": ", right", "T": ", upper lip", "B": ", lower lip"}.get(mark, "")
-    return f"{load_units().catalogue.unit_of(code).name} ({number}){side}"
+    return f"{load_units().catalogue.unit_of(code).plain} ({number}){side}"

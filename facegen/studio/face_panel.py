@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import random
+import time
 from dataclasses import replace
 
 from facegen.facs.blend import blend
@@ -17,6 +18,7 @@ from facegen.studio.unit_sliders import UnitSliders
 from facegen.studio.work import FaceWork, Work
 
 _NOBODY = "nobody in particular"
+_LISTED = 1.0           # seconds until folders are looked at again
 _SEEDS = 10_000         # short to write down
 
 
@@ -50,6 +52,7 @@ class FacePanel:
         self._rig.on_update(page.calls(self._other_face))
         self._person.on_update(page.calls(self._other_person))
         self._take = TakeAway(page)
+        self._listed = -_LISTED
         gui.add_command("Expression by chance").on_trigger(page.calls(self._chance))
         gui.add_command("Face at rest").on_trigger(page.calls(self._reset))
 
@@ -86,12 +89,15 @@ class FacePanel:
     def refresh(self, work: Work) -> None:
         """Show a work."""
         face = work.face
-        names = self.page.desk.face_names(self.page.name)
-        if tuple(self._rig.options) != names:
-            self._rig.options = names
+        # Other tabs make faces and people.
+        if time.monotonic() - self._listed > _LISTED or face.rig not in self._rig.options:
+            self._listed = time.monotonic()
+            names, people = self.page.desk.face_names(self.page.name), self._people()
+            if tuple(self._rig.options) != names:
+                self._rig.options = names
+            if tuple(self._person.options) != people:
+                self._person.options = people
         self._rig.value = face.rig
-        if tuple(self._person.options) != self._people():
-            self._person.options = self._people()
         self._person.value = face.person or _NOBODY
         self._intensity.value = face.intensity
         self._palette.refresh(work)
@@ -102,5 +108,6 @@ class FacePanel:
         self._take.refresh(work)
 
     def close(self) -> None:
-        """End the drawing of thumbnails."""
+        """End what runs beside the page."""
         self._palette.close()
+        self._chain.close()

@@ -76,7 +76,7 @@ class Figure:
             handle.opacity = opacity
 
     def remove(self) -> None:
-        """Take it from the scene."""
+        """Take it from the scene; what is asked of it afterwards does nothing."""
         for handle, _ in self._handles:
             handle.remove()
         self._handles = []

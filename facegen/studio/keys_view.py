@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any, Protocol
 
 from facegen.animation.easing import DEFAULT_EASE
@@ -69,15 +70,15 @@ class KeysView:
         self._at.on_update(calls(self._moved))
         self._pose = TextBox(self._host.page, "Shows", "", read=keying.read_pose, write=keying.write_pose,
                              changed=self._posed, hint="An expression's name or a FACS script, such as 6C+12D.")
-        self._strength = gui.add_slider("Strength", 0.0, 1.0, 0.01, 1.0)
+        self._strength = gui.add_slider("Strength", 0.0, 1.0, 0.01, 1.0, marks=())
         self._strength.on_update(calls(lambda: self._set("strength", intensity=float(self._strength.value))))
         self._ease = gui.add_dropdown("Gets there", tuple(EASES), hint="How the face gets to this key from the one "
                                                                        "before; of an event, how it comes and goes.")
         self._ease.on_update(calls(lambda: self._set("way to a key", ease=EASES[self._ease.value])))
         self._times = {}
         for part, (label, hint) in _PARTS.items():
-            self._times[part] = number = gui.add_number(label, 0.0, min=0.0, step=0.01, hint=hint)
-            number.on_update(calls(lambda part=part: self._set(part, **{part: float(self._times[part].value)})))
+            self._times[part] = number = gui.add_number(label, 0.0, min=0.0, step=0.005, hint=hint)
+            number.on_update(calls(partial(self._timed, part)))
         self._acts = gui.add_button_group("", _ACTS, hint="Show the face of the Face tab here; copy this key to the "
                                                           "time of the slider; delete it.")
         self._acts.on_click(calls(self._act))
@@ -179,7 +180,8 @@ class KeysView:
         if item is None:
             return
         self._at.value = timeline.time_of(item)
-        self._pose.refresh(item.get("pose", ""))
+        kind = load_timing().kinds.get(item.get("kind", ""))
+        self._pose.refresh(item.get("pose", (kind.pose or "") if kind and "raw" not in item else ""))
         self._strength.value = float(item.get("intensity", 1.0))
         names = {value: label for label, value in EASES.items()}
         self._ease.value = names.get({"hold": "step"}.get(item.get("ease"), item.get("ease")), names[DEFAULT_EASE])
@@ -223,6 +225,9 @@ class KeysView:
         chosen = self._host.chosen
         script = timeline.change(self._host.script, chosen.track, chosen.index, **fields)
         self._host.edit(label, script, chosen, thing=label)
+
+    def _timed(self, part: str) -> None:
+        self._set(part, **{part: float(self._times[part].value)})
 
     def _act(self) -> None:
         chosen, act = self._host.chosen, self._acts.value

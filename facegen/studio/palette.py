@@ -32,7 +32,7 @@ class Palette:
         self._buttons: dict[str, Any] = {}
         self._pictures: dict[str, str] = {}
         self._shares: dict[str, Any] = {}
-        self._mixing = False
+        self._chosen_now: frozenset[str] = frozenset()
         gui = page.client.gui
         self._folder = gui.add_folder("Expressions")
         with self._folder:
@@ -53,8 +53,7 @@ class Palette:
     def _searched(self) -> None:
         found = search(vocabulary(self._person), self._search.value)
         for name, button in self._buttons.items():
-            if button.visible != (name in found):
-                button.visible = name in found
+            button.visible = name in found
         self._none.visible = not found
         if not found:
             self._none.content = (f"Nothing is called *{self._search.value.strip()}*. "
@@ -86,11 +85,14 @@ class Palette:
         person = self._page.person()
         if not self._buttons or person != self._person:
             self._build(person)
+            self._chosen_now = frozenset()
         elif rig is not self._rig:
             self._draw()
         self._rig = rig
-        for name, button in self._buttons.items():
-            self._picture(name, button, on=name in face.blend)
+        for name in self._chosen_now.symmetric_difference(face.blend):
+            if name in self._buttons:
+                self._picture(name, self._buttons[name], on=name in face.blend)
+        self._chosen_now = frozenset(face.blend)
         self._mixed(face)
 
     def _build(self, person: Person | None) -> None:
@@ -107,6 +109,7 @@ class Palette:
                 button = gui.add_button(plain(name), hint=one.about, order=row)
             button.on_click(self._page.calls(partial(self._chosen, name)))
             self._buttons[name] = button
+            self._picture(name, button, on=False)
         self._draw()
         self._searched()
 

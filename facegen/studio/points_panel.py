@@ -262,7 +262,7 @@ class PointsPanel:
         about = f"Made by hand on the face {work.rig}."
         if self._what.value == _WHAT[1]:
             meaning = self.page.meaning()
-            deformation = whole_pose(face, meaning.deformation, *meaning.more, units=deformation.units)
+            deformation = raws.whole_pose(face, meaning.deformation, *meaning.more, units=deformation.units)
             about = f"{work.script}, and what was moved by hand on the face {work.rig}."
         if not deformation:
             raise InputError("file: nothing is moved here yet, so there is nothing to save")
@@ -297,19 +297,6 @@ def said(point: str, face: Face) -> str:
 @lru_cache(maxsize=8)
 def _grip(face: Face, point: str) -> Grip:
     return Grip(face, point)
-
-
-def whole_pose(face: Face | None, *several: Deformation, units: str) -> Deformation:
-    """Return a sum of movements in one unit of length, without points and folds that the face lacks.
-
-    face: None for an avatar, which cannot convert lengths: InputError if they differ.
-    """
-    if face is None:
-        total = several[0]
-        for one in several[1:]:
-            total = total + one
-        return total
-    return face.possible(face.total(*several, units=units))
 
 
 def read_raw(name: str, content: bytes) -> raws.Raw:

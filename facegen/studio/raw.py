@@ -131,5 +131,18 @@ def with_own_names(raw: Raw, face: Face) -> Raw:
     return _plain(replace(found, points={names.get(name, name): one for name, one in found.points.items()}))
 
 
+def whole_pose(face: Face | None, *several: Deformation, units: str) -> Deformation:
+    """Return a sum of movements in one unit of length, without points and folds that the face lacks.
+
+    face: None for an avatar, which cannot convert lengths: InputError if they differ.
+    """
+    if face is None:
+        total = several[0]
+        for one in several[1:]:
+            total = total + one
+        return total
+    return face.possible(face.total(*several, units=units))
+
+
 def _plain(found: Deformation) -> dict[str, Any]:
     return found.as_dict()

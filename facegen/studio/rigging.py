@@ -20,7 +20,7 @@ from facegen.studio.avatar_checks import set_names
 from facegen.studio.avatar_file import FOLDER, Opened
 from facegen.studio.desk import FACES
 from facegen.studio.landmark_words import WORDS
-from facegen.studio.picking import as_landmarks, file_text, missing
+from facegen.studio.picking import as_landmarks, file_text, missing, words_for
 from facegen.studio.work import AvatarWork
 from facegen.transfer.alignment import align
 from facegen.transfer.apart import take_apart
@@ -98,8 +98,11 @@ class RigMaker:
             report("reading the avatar", 0.0)
             marks = make_folder(self.folder / FOLDER) / f"{opened.output}.landmarks.yaml"
             save_text(file_text(work, opened.avatar.digest), marks)
-            self._laid = now, Rigging(opened.path, landmarks=marks, sets=set_names(work.sets),
-                                      pieces=dict(work.pieces))
+            try:
+                made = Rigging(opened.path, landmarks=marks, sets=set_names(work.sets), pieces=dict(work.pieces))
+            except InputError as error:             # of a file that the person never sees
+                raise InputError(words_for(str(error).removeprefix(f"{marks}: "))) from None
+            self._laid = now, made
         return self._laid[1]
 
 

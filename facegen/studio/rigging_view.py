@@ -104,6 +104,10 @@ class RiggingView:
             self._find(opened)
             self._stamp = (work.avatar, opened, self._face, self.task)
             self._refresh_controls(work.avatar)
+        chosen = set_names(work.avatar.sets)
+        for name, box in self._sets.items():
+            box.value = name in chosen
+        self.tuning.refresh(work.avatar)
         self._use.disabled = opened is not None and work.face.rig == opened.output
         self._show(work)
 
@@ -117,9 +121,6 @@ class RiggingView:
 
     def _refresh_controls(self, avatar: AvatarWork) -> None:
         opened, made = self.scene.opened, self._face is not None
-        chosen = set_names(avatar.sets)
-        for name, box in self._sets.items():
-            box.value = name in chosen
         left = len(rigging.missing(avatar))
         self._place.visible = self.task is not None
         self._rig.disabled = self.task is not None or opened is None or bool(left)
@@ -130,7 +131,6 @@ class RiggingView:
             handle.visible = made
         self._told.content = "\n".join(f"- ⚠ {words_for(each)}" for each in self._warnings)
         self._told.visible = bool(self._warnings)
-        self.tuning.refresh(avatar)
         self._split_pieces(avatar)
 
     def _show(self, work: Work) -> None:

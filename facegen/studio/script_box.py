@@ -32,5 +32,4 @@ class ScriptBox:
         content = "\n".join(f"- {warning}" for warning in (*meaning.warnings, *self._page.rig.check(meaning)))
         if self._warnings.content != content:
             self._warnings.content = content
-        if self._warnings.visible != bool(content):
-            self._warnings.visible = bool(content)
+        self._warnings.visible = bool(content)

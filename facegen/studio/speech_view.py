@@ -32,9 +32,10 @@ class SpeechView:
         self._way.on_update(calls(self._show_way))
         self._words = gui.add_text("Words", "", multiline=True)
         self._language = gui.add_text("Language", _USUAL, hint="en-us, en-gb, de, fr, es, it, ja ...")
-        self._speed = gui.add_slider("How fast", 0.5, 2.0, 0.05, 1.0)
+        self._speed = gui.add_slider("How fast", 0.5, 2.0, 0.05, 1.0, marks=())
         self._at = gui.add_number("Begins at (s)", 0.0, min=0.0, step=0.1)
-        self._effort = gui.add_slider("How wide", 0.0, 2.0, 0.05, 1.0, hint="How wide the mouth opens; 1 is calm.")
+        self._effort = gui.add_slider("How wide", 0.0, 2.0, 0.05, 1.0, marks=(),
+                                      hint="How wide the mouth opens; 1 is calm.")
         self._told = gui.add_markdown("")
         gui.add_button("Say it").on_click(calls(self._said))
         self._no = gui.add_button("Say nothing", color="gray", visible=False)

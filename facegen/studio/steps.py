@@ -52,9 +52,7 @@ class Steps:
     def refresh(self, history: History) -> None:
         """Show what can be taken back."""
         label = f"Last: {history.undoes}" if history.undoes else _NOTHING
-        if self._buttons.label != label:
-            self._buttons.label = label
+        self._buttons.label = label
         again = f"; Ctrl+Shift+Z does {history.redoes} again" if history.redoes else ""
-        hint = (f"Ctrl+Z takes {history.undoes} back" if history.undoes else "Nothing to take back") + again
-        if self._buttons.hint != hint:
-            self._buttons.hint = hint
+        back = f"Ctrl+Z takes {history.undoes} back" if history.undoes else "Nothing to take back"
+        self._buttons.hint = back + again

@@ -211,7 +211,8 @@ def item_text(item: Mapping[str, Any]) -> str:
     pose = item.get("pose")
     if pose is not None:
         said.append("+".join(f"{key}={value}" if not isinstance(value, Mapping) else str(key)
-                             for key, value in pose.items()) if isinstance(pose, Mapping) else str(pose))
+                             for key, value in pose.items()) if isinstance(pose, Mapping) else
+                    "at rest" if str(pose) in ("0", "neutral") else str(pose))
     said += [part for part in ("raw", "head", "eyes") if part in item]
     return " ".join(said) or "pose"
 

@@ -103,17 +103,15 @@ class Transport:
             self._start(speed, loop)
 
     def stop(self) -> None:
-        """Let time stand."""
+        """Let time stand, and show where it stands."""
         with self._changed:
-            if self._run is not None:
-                self._now()
-                self._run = None
-                self._stopped()
+            if self._halt():
+                self.show()
 
     def seek(self, t: float) -> None:
         """Stop, go to a time and show it."""
         with self._changed:
-            self.stop()
+            self._halt()
             self.head = min(max(float(t), 0.0), self.duration)
             self.show()
 
@@ -131,6 +129,15 @@ class Transport:
             self._off()
             self._changed.notify_all()
 
+    def _halt(self) -> bool:
+        with self._changed:
+            if self._run is None:
+                return False
+            self._now()
+            self._run = None
+            self._stopped()
+            return True
+
     def _start(self, speed: float, loop: bool) -> None:
         self._run = Run(self.head, self._clock(), speed, loop, self.duration)
         self._began(self.head)
@@ -140,7 +147,7 @@ class Transport:
         try:
             return self._posed(motion, rig)(self._now())
         except Exception:
-            self.stop()                         # told once, not thirty times a second
+            self._halt()                        # told once, not thirty times a second
             raise
 
     def _posed(self, motion: Motion, rig: Any) -> Shown:

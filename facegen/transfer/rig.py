@@ -93,6 +93,7 @@ class Rigging:
         self.warnings = (*check_places(self.places, self.source.mesh), *_without_expressions(self.source, asked.sets))
         self._pieces, self._cache = pieces, cache
         self._binding: Binding | None = None
+        self._once = False
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -113,6 +114,8 @@ class Rigging:
         sets, source = self._asked.sets, self.source
         check_output(source, output, sets)
         found = self._shapes(None, choices, within(progress, 0.0, 0.9))
+        if self._once:
+            self._binding = None        # at 100,000 triangles 200 MiB, which writing can use
         made = {name: found.shapes[name] for name in sets}
         made |= {half_name(name): moved for name, moved in found.halves.items()}
         expressions = {name: {name: 1.0} for name, kind in sets.items() if kind == "vrm"}
@@ -162,6 +165,7 @@ def rig(avatar: str | Path, output: str | Path, *, landmarks: str | Path | None 
     progress("reading the avatar", 0.0)
     rigging = Rigging(avatar, landmarks=landmarks, sets=sets, shapes=shapes, person=person, template=template,
                       template_landmarks=template_landmarks, pieces=pieces, cache=cache)
+    rigging._once = True
     return rigging.save(output, method=method, weights=weights, opening=opening, lid_closure=lid_closure,
                         normals=normals, quantise=quantise, progress=within(progress, 0.05, 1.0))
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 from pathlib import Path
 
@@ -201,3 +202,35 @@ def test_wrong_tables(tmp_path, change, words):
     with pytest.raises(facegen.TableError) as caught:
         read_timing(_table(tmp_path, change))
     assert words in str(caught.value)
+
+
+RAW = {"jaw": {"open": 10.0}}
+
+
+def test_raw_movements_lie_on_top_of_a_pose():
+    clip = load_clip({"keyframes": [{"t": 0, "pose": "0"}, {"t": 1, "pose": "12D", "raw": RAW, "intensity": 0.5}]})
+    face = facegen.load_face()
+    units = facegen.resolve("12D", intensity=0.5)
+    expected = face.pose(dataclasses.replace(units, more=(facegen.Deformation(jaw={"open": 5.0}),)))
+    assert face.pose(clip.at(1.0)) == pytest.approx(expected)
+    alone = load_clip({"events": [{"at": 0, "raw": RAW, "onset": 0.1, "apex": 1}]})
+    assert face.pose(alone.at(0.5)) == pytest.approx(face.pose({"jaw": {"open": 10.0}}))
+    with pytest.raises(facegen.TableError, match=r"keyframes.1.raw: the pose is raw data already"):
+        load_clip({"keyframes": [{"t": 0, "pose": "0"}, {"t": 1, "pose": RAW, "raw": RAW}]})
+    with pytest.raises(facegen.TableError, match=r"raw.jaw: unknown key 'opn'; did you mean 'open'"):
+        load_clip({"keyframes": [{"t": 0, "pose": "0"}, {"t": 1, "raw": {"jaw": {"opn": 1}}}]})
+
+
+@pytest.mark.parametrize(("script", "place"), [
+    ({"keyframes": [{"t": 1, "pose": "face.yaml"}]}, "keyframes.0.pose"),
+    ({"keyframes": [{"t": 1, "pose": "0"}], "person": "me.yaml"}, "person"),
+    ({"keyframes": [{"t": 1, "pose": "0"}], "speech": "said.TextGrid"}, "speech"),
+    ({"speech": {"timing": "said.tsv"}}, "speech.timing"),
+    ({"speech": {"phonemes": "AA1", "sound": "said.wav"}}, "speech.sound"),
+    ({"tracks": [{"replace": "face.yaml", "events": [{"at": 0, "kind": "blink"}]}]}, "tracks.0.replace")])
+def test_a_strangers_script_opens_no_file(tmp_path, script, place):
+    (tmp_path / "face.yaml").write_text("jaw: {open: 10}")
+    path = tmp_path / "clip.json"
+    path.write_text(json.dumps(script))
+    with pytest.raises(facegen.TableError, match=rf"{place}: .*this script may name no files"):
+        load_clip(path, files=False)

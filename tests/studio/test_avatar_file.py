@@ -107,7 +107,7 @@ def test_what_is_too_much_is_refused(tmp_path, monkeypatch):
     monkeypatch.setattr(avatar_file, "LIMITS", Limits(file_bytes=100, triangles=1))
     with pytest.raises(InputError, match="MB, the studio takes up to"):
         keep(tmp_path, "a.obj", TRIANGLE + b"#" * 100)
-    with pytest.raises(InputError, match=r"^a\.obj: has 2 triangles; the studio opens avatars of up to 1"):
+    with pytest.raises(InputError, match=r"^a\.obj: has 2 triangles, the studio takes up to 1"):
         keep(tmp_path, "a.obj", TRIANGLE + b"v 0 0 1\nf 1 2 4\n")
     assert not list((tmp_path / FOLDER).iterdir())
 

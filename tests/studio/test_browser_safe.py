@@ -101,21 +101,3 @@ def test_no_script_but_the_page_s_own_runs(serve, browser_page):
     page.page.wait_for_timeout(1000)
     assert page.page.title() == "facegen studio"
     page.errors.clear()         # the browser tells of what it did not run
-
-
-def test_an_upload_that_is_refused_is_told_of_and_another_goes(serve, browser_page, tmp_path):
-    from facegen.studio.limits import Limits
-
-    came = []
-
-    def build(client, work):
-        client.gui.add_upload_button("Open").on_upload(lambda event: came.append(event.target.value.name))
-
-    page = browser_page(serve(build, limits=Limits(file_bytes=1 << 20)))
-    (tmp_path / "large.glb").write_bytes(b"x" * 3_000_000)
-    (tmp_path / "small.glb").write_bytes(b"x" * 1000)
-    page.upload("Open", tmp_path / "large.glb")
-    page.says("large.glb has 2.9 MiB; the studio opens such files up to 1.0 MiB.")
-    assert not came
-    page.upload("Open", tmp_path / "small.glb")
-    page.until(lambda: came == ["small.glb"])

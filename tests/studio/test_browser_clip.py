@@ -1,0 +1,73 @@
+"""The timeline in a browser: two faces are keyed and lie between, it plays, files come and go."""
+
+from __future__ import annotations
+
+import numpy as np
+
+import facegen
+from facegen.studio.work import FaceWork
+
+
+def moved(one: np.ndarray, other: np.ndarray) -> float:
+    """Return the share of the picture that differs clearly."""
+    return float((np.abs(one.astype(int) - other.astype(int)).max(axis=2) > 24).mean())
+
+
+def timeline(studio, browser_page):
+    """A page at the Timeline tab, and the program's side of it."""
+    made = studio()
+    page = browser_page(made.server)
+    page.until(lambda: made.pages)
+    one, = made.pages.values()
+    page.tab("Timeline")
+    return page, one
+
+
+def test_two_faces_are_keyed_scrubbed_played_and_taken_away(studio, browser_page, tmp_path):
+    page, one = timeline(studio, browser_page)
+    neutral = page.still()
+    page.drag_slider("Time (s)", 0.0)
+    page.press("Key the face as it is now")
+    page.until(lambda: one.work.clip.script)
+    one.change("a face", face=FaceWork(units={"26": 1.0, "27": 0.6, "1": 1.0, "2": 1.0}))
+    page.drag_slider("Time (s)", 1.0)
+    page.press("Key the face as it is now")
+    page.until(lambda: len(one.work.clip.script["keyframes"]) == 2)
+    wide = page.changed(neutral)
+    assert moved(wide, neutral) > 0.01
+    page.drag_slider("Time (s)", 0.5)
+    half = page.changed(wide)
+    assert moved(half, wide) > 0.002
+    assert moved(half, neutral) > 0.002
+    page.drag_slider("Time (s)", 0.0)
+    page.until(lambda: moved(page.pixels(), neutral) < 0.002)
+    page.press("Play")
+    page.until(lambda: moved(page.pixels(), neutral) > 0.002)
+    page.until(lambda: page.value("Time (s)") > 0.5)
+    page.press("Pause")
+    page.page.get_by_text("Save as").click()
+    page.choose("What", "Recording: facegen's own (.csv)")
+    found = facegen.load_performance(page.download(tmp_path, lambda: page.press("Save")))
+    assert found.weights[-1].max() == 1.0
+    assert found.weights[0].max() == 0.0
+    assert len(found) == 100                        # 4 s, 25 a second
+
+
+def test_a_recording_is_opened_plays_on_any_face_and_is_there_after_a_reload(studio, browser_page, tmp_path):
+    page, one = timeline(studio, browser_page)
+    neutral = page.still()
+    take = tmp_path / "take.csv"
+    take.write_text("time,jawOpen,browInnerUp\n0,0,0\n1,1,1\n2,1,1\n")
+    page.page.get_by_text("Recording", exact=True).click()
+    page.upload("Open a recording", take)
+    page.until(lambda: one.work.clip.recording == "take.csv")
+    page.drag_slider("Time (s)", 1.0)
+    opened = page.changed(neutral)
+    assert moved(opened, neutral) > 0.005
+    page.reload()
+    page.tab("Timeline")
+    page.page.get_by_text("Recording", exact=True).click()
+    page.says("take.csv")
+    page.until(lambda: not page.button("Play").is_disabled())
+    page.drag_slider("Time (s)", 1.0)
+    page.until(lambda: moved(page.pixels(), opened) < 0.002)
