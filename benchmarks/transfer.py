@@ -130,7 +130,7 @@ def page(measured: dict[int, dict], peers: dict[int, dict], command: str, load: 
         f"{platform.system()}, Python {platform.python_version()}; {', '.join(report.versions(_PACKAGES))}. "
         f"Load of the machine before the run: {load:.1f}.",
         f"The shipped human, subdivided and decimated, gets {shapes} shapes (`--set {SETS}`) in a GLB with normals. "
-        "CPU seconds of all threads, in brackets wall seconds, which other work on the machine prolongs. "
+        "CPU seconds of all threads and forks, in brackets wall seconds, which other work on the machine prolongs. "
         "*Load* is everything before the transfer: reading, checking landmarks, the template. *Shapes* is everything "
         "after the registration: solve, lids, lips, pieces. *Whole process* begins with the start of Python.",
         our_table(measured), *(["\n".join(lines)] if (lines := verdicts(measured)) else []),

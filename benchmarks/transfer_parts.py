@@ -23,6 +23,12 @@ REGISTRATIONS = ("trimesh nricp_sumner", "trimesh nricp_amberg")
 PEERS = (*REGISTRATIONS, "Sumner, a solve for each shape")
 
 
+def cpu() -> float:
+    """Return CPU seconds of this process and of its forks so far."""
+    about = [resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
+    return sum(one.ru_utime + one.ru_stime for one in about)
+
+
 class Clock:
     """Seconds of named steps, wall and CPU, summed over their calls."""
 
@@ -31,11 +37,11 @@ class Clock:
 
     @contextmanager
     def __call__(self, name: str):
-        wall, cpu = time.perf_counter(), time.process_time()
+        wall, begun = time.perf_counter(), cpu()
         try:
             yield
         finally:
-            for key, since, now in ((name, wall, time.perf_counter()), (f"{name}_cpu", cpu, time.process_time())):
+            for key, since, now in ((name, wall, time.perf_counter()), (f"{name}_cpu", begun, cpu())):
                 self.seconds[key] = self.seconds.get(key, 0.0) + now - since
 
     def on(self, module, name: str, step: str) -> None:
@@ -53,7 +59,7 @@ def used() -> dict[str, float]:
     """Return CPU seconds and the peak of memory, MiB, of this process so far."""
     about = resource.getrusage(resource.RUSAGE_SELF)
     peak = about.ru_maxrss / (2**20 if sys.platform == "darwin" else 2**10)
-    return {"cpu": about.ru_utime + about.ru_stime, "peak": peak}
+    return {"cpu": cpu(), "peak": peak}
 
 
 def facegen(avatar: str, output: str, solver: str, sets: str, cache: str) -> dict[str, float]:
@@ -67,10 +73,10 @@ def facegen(avatar: str, output: str, solver: str, sets: str, cache: str) -> dic
     clock.on(transfer, "lay_skin", "registration")
     clock.on(transfer.Binding, "shapes", "shapes")
     clock.on(rig, "save_avatar", "save")
-    begun = time.process_time()
+    begun = cpu()
     made = rig.rig(avatar, output, landmarks=Path(avatar).with_suffix(".yaml"), sets=sets.split(","))
     found = clock.seconds
-    for unit, whole in (("", time.perf_counter() - start), ("_cpu", time.process_time() - begun)):
+    for unit, whole in (("", time.perf_counter() - start), ("_cpu", cpu() - begun)):
         found[f"load{unit}"] = whole - sum(found[f"{step}{unit}"] for step in ("registration", "shapes", "save"))
     return {**found, "count": len(made.names)}
 

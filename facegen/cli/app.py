@@ -26,6 +26,7 @@ from facegen.cli import (
     speak,
 )
 from facegen.cli import fit as fitting
+from facegen.cli import landmarks as marking
 from facegen.cli import rig as rigging
 from facegen.cli import stream as streaming
 from facegen.cli import studio as studying
@@ -49,6 +50,7 @@ app.command("animate")(film.animate)
 app.command("morph")(film.morph)
 app.command("turntable")(film.turntable)
 app.command("play")(play.play)
+app.command("landmarks")(marking.landmarks)
 app.command("rig")(rigging.rig)
 app.command("fit")(fitting.fit)
 app.command("speak")(speak.speak)

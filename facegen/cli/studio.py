@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import logging
-import secrets
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -16,7 +14,7 @@ if TYPE_CHECKING:
 Host = Annotated[str, typer.Option(
     "--host", metavar="ADDRESS", help="Where it listens; for any address but this machine's own a token is asked for.")]
 Port = Annotated[int | None, typer.Option(
-    "--port", min=1, max=65535, metavar="N", help="[default: 8092, or the next that is free]")]
+    "--port", metavar="N", help="0 takes any that is free. [default: 8092, or the next that is free]")]
 Token = Annotated[str | None, typer.Option(
     "--token", metavar="TOKEN", envvar="FACEGEN_STUDIO_TOKEN",
     help="What a visitor must bring, in the address; 'new' makes one.")]
@@ -33,6 +31,8 @@ def studio(host: Host = "127.0.0.1", port: Port = None, token: Token = None, wor
 
     For example: facegen studio
     """
+    import secrets
+
     from facegen.studio import run
     from facegen.studio.needs import import_viser
 
@@ -61,6 +61,8 @@ def _started(found: Studio, *, browser: bool) -> None:
 
 def _tell_on_stderr() -> None:
     """Have what was refused or failed told in a line each."""
+    import logging
+
     handler = logging.StreamHandler(sys.stderr)
     handler.setFormatter(logging.Formatter("facegen studio: %(message)s"))
     log = logging.getLogger("facegen.studio")

@@ -55,12 +55,12 @@ def chain(meaning: Resolution, rig: Any, person: str | None = None) -> dict[str,
         "about": one.about if one else None, "source": meaning.source, "units": units,
         "combinations": list(combinations(table, meaning.units)),
         "coefficients": {name: round(value, 6) for name, value in table.coefficients(meaning.units).items()},
-        "own": own, "person": person, "deformation": whole(meaning).as_dict(), "face": rig.name, **moved,
+        "own": own, "person": person, "deformation": _whole(meaning).as_dict(), "face": rig.name, **moved,
         "warnings": list(meaning.warnings),
     }
 
 
-def whole(meaning: Resolution) -> Deformation:
+def _whole(meaning: Resolution) -> Deformation:
     """Return all movements in one where their units of length agree, else those of the units and angles alone."""
     every = [one for one in (meaning.deformation, *meaning.more) if one]
     if len({one.units for one in every if one.has_lengths}) > 1:

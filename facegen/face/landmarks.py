@@ -64,19 +64,25 @@ def read_landmarks(path: Path, mesh_name: str, n_vertices: int, faces: NDArray[n
     return {name: read_landmark(entry, n_vertices, faces, parts) for name, entry in entries.items()}
 
 
-def landmark_entries(path: Path | str) -> tuple[Entry | None, dict[str, Entry]]:
+def landmark_entries(path: Path | str, *, partial: bool = False) -> tuple[Entry | None, dict[str, Entry]]:
     """Return what a landmark file says of its mesh (or None) and its landmarks, not yet read, in the order of `NAMES`.
 
-    Raises TableError (unknown names; all missing ones at once) or FileError.
+    partial: required ones may be missing. The file may say how sure it is of each (``confidence``: 0 to 1), which is
+    checked and left at that. Raises TableError (unknown names; all missing ones at once) or FileError.
     """
-    top = Entry(read_data(path), str(path)).fields(required=("landmarks",), optional=("mesh", "about", "source"))
+    top = Entry(read_data(path), str(path)).fields(required=("landmarks",),
+                                                   optional=("mesh", "about", "source", "confidence"))
+    for name, entry in top["confidence"].items() if "confidence" in top else ():
+        if name not in NAMES:
+            raise entry.fail(f"unknown landmark '{name}'{nearest(name, NAMES)}")
+        entry.number(0.0, 1.0)
     found = {}
     for name, entry in top["landmarks"].items():
         if name not in NAMES:
             raise entry.fail(f"unknown landmark '{name}'{nearest(name, NAMES)}")
         found[name] = entry
     missing = [f"'{name}'" for name in REQUIRED if name not in found]
-    if missing:
+    if missing and not partial:
         raise top["landmarks"].fail(f"the landmark{'s' * (len(missing) > 1)} {', '.join(missing)} "
                                     f"{'are' if len(missing) > 1 else 'is'} missing")
     return top.get("mesh"), {name: found[name] for name in NAMES if name in found}

@@ -20,7 +20,7 @@ Array = NDArray[np.float64]
 
 # Of the vector, mm, by which the slope is measured: lids bend little over so much.
 _STEP = 0.25
-_ROUNDS = 12
+_ROUNDS = 20
 # Millimetres that no eye sees.
 _NEAR = 1e-4
 # A vector that long, mm, leaves the face: half the width of a head.
@@ -45,9 +45,11 @@ def movable_points(face: Face) -> tuple[str, ...]:
 
 
 class Grip:
-    """One feature point of a face, held. mirrored: the point on the other side goes along as its mirror image.
+    """One feature point of a face, held; ``row``: its place among them.
 
-    A point in the middle, mirrored, stays there. Raises InputError for a point that is none or takes no vector.
+    mirrored: the point on the other side goes along as its mirror image.
+
+    A point in the middle then stays there. Raises InputError for a point that is none or takes no vector.
     """
 
     def __init__(self, face: Face, point: str, *, mirrored: bool = False, detail: int = 2) -> None:
@@ -59,10 +61,10 @@ class Grip:
         other = mirror_name(point)
         self.point = point
         self.other = other if mirrored and other in movable else None
-        self._row = names.index(point)
+        self.row = names.index(point)
         self._other = names.index(self.other) if self.other else None
         self._middle = self.other == point
-        weights = face.point_weights(detail)[[self._row]]
+        weights = face.point_weights(detail)[[self.row]]
         order = np.argsort(weights.indices)
         self._weights = weights.data[order]
         self._posed = face.some_posed(weights.indices[order].astype(np.int64), detail=detail)
@@ -71,7 +73,7 @@ class Grip:
         """Return where the point lies (k, 3), mm, with vectors (k, 3) of its own beside what ``controls`` have."""
         vectors = np.atleast_2d(np.asarray(vectors, np.float64))
         many = np.repeat(controls.vectors[None], len(vectors), axis=0)
-        many[:, self._row] += vectors
+        many[:, self.row] += vectors
         if self._other is not None and not self._middle:
             many[:, self._other] += vectors * [-1.0, 1.0, 1.0]
         rest = {name: np.repeat(getattr(controls, name)[None], len(vectors), axis=0)
@@ -86,22 +88,22 @@ class Grip:
         target = np.asarray(target, np.float64)
         free = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]) if self._middle else np.eye(3)
         vector = np.asarray(start, np.float64) * free.any(axis=0)
-        best = None
+        best = step = None
         for _ in range(_ROUNDS):
             here, *beside = self.places(controls, np.concatenate([vector[None], vector + _STEP * free]))
             miss = target - here
             away = float(np.linalg.norm(miss))
-            if best is None or away < best.missed - _NEAR:
+            if best is not None and away >= best.missed:        # too far: skin came to rest on something
+                step = step / 2.0
+            else:
                 best = Reached(vector, here, away)
-            elif away > best.missed + _NEAR or away <= _NEAR:
+                slope = (np.array(beside) - here).T / _STEP     # (3, free)
+                u, sizes, v = np.linalg.svd(slope, full_matrices=False)
+                held = sizes > _LEAST_SLOPE
+                step = ((u.T @ miss)[held] / sizes[held]) @ v[held] @ free
+            if best.missed <= _NEAR or np.linalg.norm(step) <= _NEAR:
                 break
-            if away <= _NEAR:
-                break
-            slope = (np.array(beside) - here).T / _STEP         # (3, free)
-            u, sizes, v = np.linalg.svd(slope, full_matrices=False)
-            held = sizes > _LEAST_SLOPE
-            step = ((u.T @ miss)[held] / sizes[held]) @ v[held] @ free
-            vector = vector + step
+            vector = best.vector + step
             size = np.linalg.norm(vector)
             if size > LONGEST:
                 vector = vector * (LONGEST / size)

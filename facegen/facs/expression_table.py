@@ -22,7 +22,8 @@ from facegen.facs.units import Catalogue, load_catalogue
 from facegen.facs.validate import Entry
 from facegen.facs.yamlfile import SUFFIXES, read_data
 
-_HABITS = ("overrides", "adds", "aliases", "units")
+HABITS = ("overrides", "adds", "aliases", "units")
+"""Keys of a person's table, of which one at least is there."""
 
 
 @dataclass(frozen=True)
@@ -188,7 +189,7 @@ def person_from_data(data: object, source: str = "person", *, name: str = "perso
     source: names the data in errors. name: if the data give none. Raises TableError.
     """
     common, root = expressions or load_expressions(), Entry(data, source)
-    fields = root.fields(required=("about", "source"), optional=("name", *_HABITS))
+    fields = root.fields(required=("about", "source"), optional=("name", *HABITS))
     said, catalogue = fields["source"].text(), load_catalogue()
     table: dict[str, Expression] = {}
     entries: dict[str, Entry] = {}
@@ -204,7 +205,7 @@ def person_from_data(data: object, source: str = "person", *, name: str = "perso
             table[word] = _expression(word, entry, catalogue, None, said)
             entries[word] = entry
     if not any(key in fields for key in ("aliases", "units")) and not table:
-        raise root.fail(f"a person has at least one of: {', '.join(_HABITS)}")
+        raise root.fail(f"a person has at least one of: {', '.join(HABITS)}")
     aliases = _aliases(table, entries)
     for word, entry in fields["aliases"].items() if "aliases" in fields else ():
         _name(entry, word)

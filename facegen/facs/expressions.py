@@ -83,8 +83,7 @@ def resolve(what: What, *, person: str | Path | Person | None = None, intensity:
     if isinstance(intensity, bool) or not isinstance(intensity, numbers.Real) or not 0.0 <= intensity <= 1.0:
         raise InputError(f"intensity: expected a number in 0..1, got {intensity!r}")
     units = units or load_units()
-    expressions = expressions or load_expressions()
-    someone = None if person is None else load_person(person, expressions=expressions)
+    someone = None if person is None else load_person(person, expressions=expressions or load_expressions())
     own = units.own_basis(someone)
 
     if isinstance(what, Deformation):
@@ -102,6 +101,7 @@ def resolve(what: What, *, person: str | Path | Person | None = None, intensity:
     if not what.strip():
         raise InputError("what: expected an expression's name, a FACS script or a file, got an empty text")
 
+    expressions = expressions or load_expressions()
     expression = expressions.find(what, someone)
     if expression is not None:
         return _units(what, expression.units, intensity, units, own, expression)

@@ -13,7 +13,7 @@ import numbers
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, cached_property
 from pathlib import Path
 
 from facegen.data import tables_dir
@@ -74,12 +74,12 @@ class Catalogue:
     movements: Mapping[str, str]
     source: str
 
-    @property
+    @cached_property
     def codes(self) -> tuple[str, ...]:
         """Every valid code."""
         return tuple(code for unit in self.units.values() for code in unit.codes)
 
-    @property
+    @cached_property
     def atoms(self) -> tuple[str, ...]:
         """Every atom."""
         return tuple(atom for unit in self.units.values() for atom in unit.atoms)

@@ -34,10 +34,11 @@ def yaml_text(data: Mapping[str, object]) -> str:
 
 
 def entry_lines(key: str, value: object, indent: str = "") -> list[str]:
-    """Return the lines of one key of a mapping: in one line if it fits, else a block."""
+    """Return the lines of one key of a mapping: in one line if it fits and holds no further mapping, else a block."""
     head = f"{indent}{_key(key)}:"
     short = f"{head} {_flow(value)}"
-    if not isinstance(value, Mapping) or not value or len(short) <= WIDTH:
+    nested = isinstance(value, Mapping) and any(isinstance(one, Mapping) for one in value.values())
+    if not isinstance(value, Mapping) or not value or (len(short) <= WIDTH and not nested):
         return [short]
     return [head] + [line for k, v in value.items() for line in entry_lines(k, v, indent + _STEP)]
 

@@ -7,6 +7,7 @@ the same order, and names stand in ``mesh.extras.targetNames``.
 from __future__ import annotations
 
 import copy
+import itertools
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
@@ -23,9 +24,12 @@ from facegen.fileio.gltf_normals import TurningNormals
 from facegen.fileio.gltf_read import Block, GltfScene, target_names, triangles
 from facegen.fileio.jsontree import Tree
 from facegen.fileio.vrm import add_expressions
+from facegen.forked import for_each
 
 # Because quantised steps must not be seen: half a step is at most this share of the avatar's size.
 _COARSEST_ERROR = 2.5e-4
+# Triangles whose normals are made by one process at a time: fewer are not worth another one.
+_AT_A_TIME = 150_000
 
 
 @dataclass(eq=False)
@@ -263,14 +267,19 @@ class _Writer:
             return {}
         surface = TurningNormals(np.concatenate(points), np.concatenate(normals), np.concatenate(faces))
         ends = [*list(starts.values())[1:], total]
+        moving = {name: found for name in names
+                  if (found := [(first, use.motions[key[0]][name]) for key, first in starts.items()
+                                if name in use.motions[key[0]]])}
+        shapes, each = list(moving.values()), max(1, _AT_A_TIME // max(sum(map(len, faces)), 1))
+
+        def work(i: int) -> list[tuple[NDArray, NDArray]]:
+            return [surface.change(np.concatenate([first + motion.rows for first, motion in shape]),
+                                   np.concatenate([motion.values for _, motion in shape]))
+                    for shape in shapes[i * each:(i + 1) * each]]
+
+        changes = itertools.chain.from_iterable(for_each(-(-len(shapes) // each), work))
         result = {}
-        for name in names:
-            moving = [(first, use.motions[key[0]][name]) for key, first in starts.items()
-                      if name in use.motions[key[0]]]
-            if not moving:
-                continue
-            rows, change = surface.change(np.concatenate([first + motion.rows for first, motion in moving]),
-                                          np.concatenate([motion.values for _, motion in moving]))
+        for name, (rows, change) in zip(moving, changes, strict=True):
             for (key, first), end in zip(starts.items(), ends, strict=True):
                 low, high = np.searchsorted(rows, [first, end])
                 result[*key, name] = Motion(rows[low:high] - first, change[low:high])

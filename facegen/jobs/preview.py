@@ -15,6 +15,7 @@ from facegen.face.face import Face
 from facegen.face.loader import FINEST
 from facegen.face.rig import Rig
 from facegen.fileio.images import check_image_path, contact_sheet, save_image
+from facegen.progress import Progress, counted, silent
 from facegen.render.render import Renderer
 
 EXPRESSIONS = {**{name: name for name in ("happiness", "sadness", "surprise", "fear", "anger", "disgust", "contempt")},
@@ -31,14 +32,16 @@ _DETAIL = FINEST
 _SAID = 0.01
 
 
-def save_preview(face: AvatarFace, path: str | os.PathLike[str], *, size: int = 192) -> Path:
+def save_preview(face: AvatarFace, path: str | os.PathLike[str], *, size: int = 192, progress: Progress = silent
+                 ) -> Path:
     """Draw the neutral, expressions, and the blendshapes that say the most, each from two views; return the path.
 
-    size: pixels of each picture. The sheet appears whole or not at all. Raises InputError or FileError. ::
+    size: pixels of each picture. progress: called before each pose. The sheet appears whole or not at all. Raises
+    InputError or FileError. ::
 
         save_preview(facegen.load_face("cat.glb"), "cat.png")
     """
-    return save_poses(face, telling_poses(face), path, size=size)
+    return save_poses(face, telling_poses(face), path, size=size, progress=progress)
 
 
 def save_face_preview(face: Face, path: str | os.PathLike[str], *, size: int = 192) -> Path:
@@ -49,14 +52,15 @@ def save_face_preview(face: Face, path: str | os.PathLike[str], *, size: int = 1
 
 
 def save_poses(face: Rig, poses: Mapping[str, NDArray], path: str | os.PathLike[str], *, size: int = 192,
-               detail: int | None = None) -> Path:
+               detail: int | None = None, progress: Progress = silent) -> Path:
     """Draw poses, label -> vertices (n, 3), each from two views, as one sheet; return the path."""
     path = check_image_path(path)
     around = np.concatenate(list(poses.values()))
-    drawn = [[renderer.draw(vertices) for vertices in poses.values()]
-             for renderer in (Renderer(face, size=size, view=view, around=around, detail=detail) for view in VIEWS)]
+    renderers = [Renderer(face, size=size, view=view, around=around, detail=detail) for view in VIEWS]
+    drawn = [[renderer.draw(vertices) for renderer in renderers]
+             for vertices in counted(progress, "drawing", list(poses.values()))]
     labels = [f"{name} {view[0]:g},{view[1]:g}" if any(view) else name for name in poses for view in VIEWS]
-    pictures = [picture for both in zip(*drawn, strict=True) for picture in both]
+    pictures = [picture for both in drawn for picture in both]
     return save_image(contact_sheet(pictures, labels, ROW * len(VIEWS)), path)
 
 

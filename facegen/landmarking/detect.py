@@ -22,18 +22,18 @@ Array = NDArray[np.float64]
 
 # Millimetres of the base face that the picture shows, and pixels across it.
 _HALF, _LOW, _HIGH = 66.0, -105.0, 45.0
-_ACROSS = 24
+_ACROSS = 16
 _PIXEL = 2 * _HALF / _ACROSS
 # Views all round, so many degrees apart.
-_TURN = 10.0
+_TURN = 12.0
 # The largest face fills the mesh with this share of its longest side, the smallest is a person's on a whole body.
-_LARGEST, _SMALLEST, _STEP = 1.1, 1 / 16, 1.2
+_LARGEST, _SMALLEST, _STEP = 1.1, 1 / 16, 1.22
 # Depths farther behind the foremost place of a picture than this, mm, are background.
 _DEEP = 110.0
 # Samples lie so much closer than pixels.
 _CLOSER = 1.4
 # So many places are looked at more closely.
-_BEST = 10
+_BEST = 8
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,19 +85,19 @@ def _look(column: NDArray, height: Array, depth: Array, scale: float, template: 
     if rows < 0.7 * tall:
         return
     pad = tall // 3
-    picture = np.full((rows + 2 * pad) * _ACROSS, -np.inf)
-    np.maximum.at(picture, (row + pad) * _ACROSS + column, depth)
+    picture = np.full((rows + 2 * pad) * _ACROSS, -np.inf, np.float32)
+    np.maximum.at(picture, (row + pad) * _ACROSS + column, depth.astype(np.float32))
     picture = picture.reshape(-1, _ACROSS)
     for upward, view in ((1, picture), (-1, picture[::-1, ::-1])):
         windows = np.lib.stride_tricks.sliding_window_view(view, (tall, _ACROSS))[:, 0].reshape(-1, tall * _ACROSS)
-        windows = windows / scale
+        windows = windows / np.float32(scale)
         front = windows.max(axis=1)
         good = np.isfinite(front)
-        windows = np.where(good[:, None], np.maximum(windows, front[:, None] - _DEEP), 0.0)
+        windows = np.where(good[:, None], np.maximum(windows, front[:, None] - np.float32(_DEEP)), np.float32(0.0))
         rest = windows - (windows @ smooth) @ smooth.T
         size = np.linalg.norm(rest, axis=1)
         dot = rest @ template
-        score = np.where(good & (size > 0.25 * norm), dot / (np.maximum(size, 1e-300) * norm), -1.0)
+        score = np.where(good & (size > 0.25 * norm), dot / (np.maximum(size, 1e-6 * norm) * norm), -1.0)
         # a relief much stronger or weaker than a face's is none
         gain = dot / norm**2
         score = np.where((gain > 0.35) & (gain < 3.0), score, -1.0)
@@ -154,4 +154,4 @@ def _template() -> tuple[Array, Array]:
     tall = len(depths) // _ACROSS
     y, x = np.meshgrid(np.linspace(-1, 1, tall), np.linspace(-1, 1, _ACROSS), indexing="ij")
     smooth = np.linalg.qr(np.stack([np.ones_like(x), y, x**2, y**2, x**2 * y, x**4], axis=-1).reshape(-1, 6))[0]
-    return depths - smooth @ (smooth.T @ depths), smooth
+    return (depths - smooth @ (smooth.T @ depths)).astype(np.float32), smooth.astype(np.float32)

@@ -24,6 +24,8 @@ Array = NDArray[np.float64]
 _ALONG = 0.1
 # A landmark that is known counts as this many square millimetres of partners, times the stiffness' share.
 _HOLD = 4000.0
+# As a whole the face is laid by every third of its vertices, in so few ways; bent, by every second.
+_EVERY, _FEW = 3, 24
 # Normals of a place and its partner agree at least so well.
 _LEAST_COSINE = 0.3
 
@@ -57,45 +59,48 @@ class Laid:
 def lay(model: FaceModel, search: ClosestPoints, start: Similarity, known: Mapping[str, Array],
         rounds: tuple[Round, ...], bent: Array | None = None) -> Laid:
     """Return the face laid on a mesh. start: from its frame to the mesh's. known: name -> place (3,) on the mesh.
-    bent (n, 3): where it starts, in its own frame, mm."""
+    bent (n, 3): where it starts, in its own frame, mm. As a whole (`WHOLE`) it needs few of its vertices and ways."""
+    whole = rounds is WHOLE
+    some, few = slice(None, None, _EVERY if whole else _EVERY - 1), _FEW if whole else model.ways.shape[1]
+    ways, stiffness, areas = model.ways[:, :few], model.stiffness[:few], model.areas[some]
+    own_ways, at_start = ways[some], model.surface.vertices[some]
     frame = start
     x = model.surface.vertices if bent is None else bent
     names = [name for name in model.names if name in known]
     rows = [model.names.index(name) for name in names]
     marks = model.placing[rows]
-    at_ways = marks @ model.ways
+    at_ways = marks @ ways
     at_rest = marks @ model.surface.vertices
     targets = np.array([known[name] for name in names]).reshape(-1, 3)
-    k = model.ways.shape[1]
     for step in rounds:
-        feet, weight = _partners(model, search, frame, x, step.near)
+        feet, weight = _partners(model, search, frame, x, step.near, some)
         back = frame.inverse()
         goal = np.where(feet.found[:, None], back.apply(feet.points), 0.0)
         normals = np.where(feet.found[:, None], search.surface.normals[feet.faces], 0.0) @ frame.rotation
-        w = model.areas * weight
+        w = areas * weight * (model.areas.sum() / areas.sum())
         root = np.sqrt(w)[:, None]
-        across = (root * normals)[:, :, None] * model.ways[:, None, :]      # (n, 3, k)
-        across = across.reshape(len(x), -1)
-        rest = goal - model.surface.vertices
+        across = ((root * normals)[:, :, None] * own_ways[:, None, :]).reshape(len(w), -1)      # (n, 3 k)
+        rest = goal - at_start
         left = across.T @ across
         right = across.T @ (root[:, 0] * np.einsum("ni,ni->n", normals, rest))
-        along = _ALONG * (model.ways.T * w) @ model.ways + np.diag(step.stiff * model.stiffness + 1e-6 * w.sum())
-        pull = _ALONG * (model.ways.T * w) @ rest
+        along = _ALONG * (own_ways.T * w) @ own_ways + np.diag(step.stiff * stiffness + 1e-6 * w.sum())
+        pull = _ALONG * (own_ways.T * w) @ rest
         if names:
             along += _HOLD * at_ways.T @ at_ways
             pull += _HOLD * at_ways.T @ (back.apply(targets) - at_rest)
         left += np.kron(np.eye(3), along)
-        ways = np.linalg.solve(left, right + pull.T.ravel()).reshape(3, k).T
-        x = model.surface.vertices + model.ways @ ways
+        amounts = np.linalg.solve(left, right + pull.T.ravel()).reshape(3, few).T
+        x = model.surface.vertices + ways @ amounts
         frame, x = _reframed(model, frame, x)
     feet, weight = _partners(model, search, frame, x, rounds[-1].near)
     return Laid(frame, x, feet, weight)
 
 
-def _partners(model: FaceModel, search: ClosestPoints, frame: Similarity, x: Array, near: float) -> tuple[Feet, Array]:
-    """Return the partners of the face and how much each counts."""
-    normals = vertex_normals(x, model.surface.faces) @ frame.rotation.T
-    feet = search(frame.apply(x), normals, least_cosine=_LEAST_COSINE)
+def _partners(model: FaceModel, search: ClosestPoints, frame: Similarity, x: Array, near: float,
+              some: slice = slice(None)) -> tuple[Feet, Array]:
+    """Return the partners of some of the face's vertices and how much each counts."""
+    normals = vertex_normals(x, model.surface.faces)[some] @ frame.rotation.T
+    feet = search(frame.apply(x[some]), normals, least_cosine=_LEAST_COSINE)
     apart = np.where(feet.found, feet.distances, np.inf) / frame.scale
     return feet, 1.0 / (1.0 + (apart / near) ** 2) ** 2
 

@@ -9,8 +9,9 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -18,27 +19,34 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from facegen.errors import InputError, nearest
-from facegen.face.landmarks import NAMES, REQUIRED
+from facegen.face.landmarks import NAMES
 from facegen.geometry.closest import ClosestPoints
 from facegen.geometry.mesh import Mesh
 from facegen.geometry.normals import vertex_normals
 from facegen.geometry.operators import Surface
+from facegen.landmarking.confidence import A_FACE, ENOUGH_TO_START, RECOGNISED, SEEN, belief, laid_share, sure
 from facegen.landmarking.detect import candidates
+from facegen.landmarking.doubts import not_recognised, odd_places
+from facegen.landmarking.eye_pairs import eye_frames
+from facegen.landmarking.features import eye_opening, lip_line, nose_tip
 from facegen.landmarking.fit import BENT, WHOLE, Laid, lay, likeness
 from facegen.landmarking.model import FaceModel, face_model
+from facegen.landmarking.proposals import ASKED, Proposal, Proposals
 from facegen.landmarking.symmetry import Plane, follow, symmetry_planes
-from facegen.transfer.alignment import align
+from facegen.transfer.alignment import Similarity, align
 from facegen.transfer.enclosure import sample_surface
-from facegen.transfer.landmarks import Landmarks
+from facegen.transfer.piece_names import INSIDE, kind_of_name
+from facegen.transfer.pieces import face_names, find_pieces
+from facegen.transfer.weld import weld
 
 Array = NDArray[np.float64]
 
+# Because squares and cubes of smaller and larger numbers run over, and the places of a mesh far off are rounded away.
+_SMALLEST, _LARGEST, _FARTHEST = 1e-12, 1e12, 1e6
 # Samples by which the planes of symmetry are found: about so many.
 _SAMPLES = 20_000
-# A laid face whose relief is as alike as this is a face; below the second it is none.
-_A_FACE, _NO_FACE = 0.65, 0.4
 # So many of the places found are followed to their end.
-_FOLLOWED = 3
+_FOLLOWED = 2
 # So many known places say where the face is, whatever was found without them.
 _ENOUGH = 4
 # A face found where its landmarks are farther from the known ones than this, in millimetres of the base face, is
@@ -49,62 +57,10 @@ _HEAD = 90.0
 _MIDDLE = np.array([0.0, -35.0, 0.0])
 # A mirrored place is trusted so far.
 _MIRRORED = 0.9
-# The order in which places are best asked for: those that fix the face's place and size first.
-ASKED = ("eye_outer_L", "eye_outer_R", "nose_tip", "mouth_corner_L", "mouth_corner_R", "chin", "eye_inner_L",
-         "eye_inner_R", "eye_upper_L", "eye_upper_R", "eye_lower_L", "eye_lower_R", "mouth_inner_top",
-         "mouth_inner_bottom", "mouth_top", "mouth_bottom", "nose_bridge", "nose_wing_L", "nose_wing_R", "brow_inner_L",
-         "brow_inner_R", "brow_mid_L", "brow_mid_R", "brow_outer_L", "brow_outer_R")
-
-
-@dataclass(frozen=True, eq=False)
-class Proposal:
-    """A place for a landmark: on triangle ``face`` with ``barycentric`` (3,), at ``xyz`` (3,) in the mesh's axes and
-    units. ``confidence``: 0 to 1; ``why``: "given", "mirrored", "laid" and so on; ``given``: known before."""
-
-    name: str
-    face: int
-    barycentric: Array
-    xyz: Array
-    confidence: float
-    why: str
-
-    @property
-    def given(self) -> bool:
-        """Whether it was known, and is returned as it was."""
-        return self.why == "given"
-
-
-@dataclass(frozen=True, eq=False)
-class Proposals(Mapping[str, Proposal]):
-    """Name -> `Proposal`, in the order of the list of landmarks. ``face``: how surely there is a face, 0 to 1.
-    ``warnings``: a sentence each. ``ask``: the place to ask for next, or None when all required ones are known."""
-
-    places: Mapping[str, Proposal]
-    face: float
-    warnings: tuple[str, ...] = ()
-    ask: str | None = None
-    mesh: Mesh | None = field(default=None, repr=False)
-
-    def __getitem__(self, name: str) -> Proposal:
-        return self.places[name]
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self.places)
-
-    def __len__(self) -> int:
-        return len(self.places)
-
-    def below(self, confidence: float) -> list[str]:
-        """Return the names of required places that are less sure than this."""
-        return [name for name in REQUIRED if name in self.places and self.places[name].confidence < confidence]
-
-    def landmarks(self) -> Landmarks:
-        """Return the places as the landmarks that a rig takes."""
-        faces = np.array([one.face for one in self.places.values()], np.int64)
-        return Landmarks(tuple(self.places), faces, self.mesh.faces[faces].astype(np.int64),
-                         np.array([one.barycentric for one in self.places.values()]).reshape(-1, 3))
-
-
+# Lids that lie farther aside from their eyeball than this, mm, are drawn to it: a child's are lower in the face.
+_BESIDE_BALL = 4.0
+# The middles of the base face's eyeballs, mm.
+_BALLS = {"L": np.array([28.9, 0.0, 0.0]), "R": np.array([-28.9, 0.0, 0.0])}
 def propose_landmarks(mesh: Mesh | str | os.PathLike[str], known: Mapping[str, Any] | None = None) -> Proposals:
     """Return places for the landmarks of a mesh, given or read from a file, each with a confidence.
 
@@ -121,6 +77,24 @@ def propose_landmarks(mesh: Mesh | str | os.PathLike[str], known: Mapping[str, A
     return Proposer(mesh).propose(known or {})
 
 
+class _Skin:
+    """Some of a mesh's triangles, ``rows``, as a ``surface`` over all its vertices, with a ``search``."""
+
+    def __init__(self, mesh: Mesh, rows: NDArray[np.int64]) -> None:
+        self.rows = rows
+        self.surface = Surface(mesh.vertices, mesh.faces[rows])
+        self.search = ClosestPoints(self.surface)
+
+
+@dataclass(frozen=True, eq=False)
+class _Found:
+    """A face ``laid`` on the mesh, how ``alike`` it is, and what of it is ``seen``, name -> place (3,)."""
+
+    laid: Laid
+    alike: float
+    seen: Mapping[str, Array]
+
+
 class Proposer:
     """Proposes landmarks for one mesh, again and again as more become known."""
 
@@ -129,6 +103,11 @@ class Proposer:
         finite."""
         if not len(mesh.faces) or not np.isfinite(mesh.vertices).all():
             raise InputError("mesh: expected at least one triangle and finite vertices")
+        size = float(np.ptp(mesh.vertices[mesh.faces].reshape(-1, 3), axis=0).max())
+        if not _SMALLEST < size < _LARGEST or np.abs(mesh.vertices[mesh.faces]).max() > _FARTHEST * size:
+            raise InputError(f"mesh: spans {size:g} and lies up to {np.abs(mesh.vertices[mesh.faces]).max():g} from "
+                             f"the origin; expected {_SMALLEST:g} to {_LARGEST:g}, no farther off than {_FARTHEST:g} "
+                             "times that")
         self.mesh = mesh
         self._model: FaceModel = face_model()
         corners = mesh.vertices[mesh.faces]
@@ -137,8 +116,9 @@ class Proposer:
         if not len(self._solid):
             raise InputError("mesh: none of its triangles has an area")
         self._surface = Surface(mesh.vertices, mesh.faces[self._solid])
-        self._search = ClosestPoints(self._surface)
         self._area = float(areas.sum())
+        self._plane_kept: tuple[Laid, Plane] | None = None
+        self._balls: dict[str, Array] = {}              # of recognised eyes, known with the skin
 
     # -- what does not depend on what is known -------------------------------------------------------------------------
     @cached_property
@@ -147,25 +127,116 @@ class Proposer:
         return symmetry_planes(samples)
 
     @cached_property
-    def _found(self) -> tuple[Laid, float] | None:
+    def _all(self) -> _Skin:
+        """The mesh without what names say is behind lids and lips."""
+        inside = np.array([[kind_of_name(part) in INSIDE or kind_of_name(material) in INSIDE
+                            for material in self.mesh.materials] for part in self.mesh.parts])
+        hidden = inside[self.mesh.face_parts, self.mesh.face_materials][self._solid]
+        return _Skin(self.mesh, self._solid[~hidden] if not hidden.all() else self._solid)
+
+    @cached_property
+    def _start(self) -> tuple[Laid, float] | None:
         """The face laid where it is most alike, and how alike."""
-        starts = []
-        for one in candidates(self._surface.corners, self._planes):
-            laid = lay(self._model, self._search, one.frame, {}, WHOLE)
-            starts.append((likeness(self._model, laid, self._search), laid))
-        starts.sort(key=lambda one: -one[0])
-        best = None
-        for _, start in starts[:_FOLLOWED]:
-            laid = lay(self._model, self._search, start.frame, {}, BENT, start.vertices)
-            alike = likeness(self._model, laid, self._search)
-            if best is None or alike > best[1]:
-                best = laid, alike
-        return best
+        found = self._followed([one.frame for one in candidates(self._surface.corners, self._planes)])
+        if found is None or found[1] < A_FACE:
+            more = self._followed(eye_frames(self._surface, self._planes))
+            found = max((one for one in (found, more) if one is not None), key=lambda one: one[1], default=None)
+        return found
+
+    def _followed(self, frames: list[Similarity]) -> tuple[Laid, float] | None:
+        """Return the face laid from the best of several frames, and how alike it is."""
+        if not frames:
+            return None
+        search = self._all.search
+        whole = self._best_of(frames, _FOLLOWED)
+        whole = self._best_of([frame for laid in whole for frame in (laid.frame, *_beside(laid.frame))], _FOLLOWED)
+        bent = [lay(self._model, search, laid.frame, {}, BENT, laid.vertices) for laid in whole]
+        alike = [likeness(self._model, laid, search) for laid in bent]
+        best = int(np.argmax(alike))
+        return bent[best], alike[best]
+
+    @cached_property
+    def _skin(self) -> _Skin:
+        """The skin, as the pieces of a recognised face tell it; else all that names do not exclude."""
+        if self._start is None or sure(self._start[1]) < RECOGNISED:
+            return self._all
+        laid = self._start[0]
+        frame = laid.frame.inverse()
+        vertices, own = weld(frame.apply(self.mesh.vertices), self.mesh.faces)
+        points = dict(zip(self._model.names, self._model.placing @ laid.vertices, strict=True))
+        try:
+            pieces = find_pieces(vertices, own[self.mesh.faces], points, names=face_names(self.mesh))
+        except InputError:
+            return self._all
+        rows = np.concatenate([piece.faces for piece in pieces if piece.kind == "skin"])
+        for s in "LR":
+            eyes = [self.mesh.vertices[np.unique(self.mesh.faces[piece.faces])] for piece in pieces
+                    if piece.kind == f"eye_{s}"]
+            if eyes:
+                ball = max(eyes, key=lambda at: float(np.ptp(at, axis=0).max()))
+                self._balls[s] = (ball.min(axis=0) + ball.max(axis=0)) / 2
+        return _Skin(self.mesh, np.intersect1d(rows, self._solid))
+
+    @cached_property
+    def _found(self) -> _Found | None:
+        """The face found with no place known."""
+        if self._start is None:
+            return None
+        laid, alike = self._start
+        return self._finished(laid, alike, {})
+
+    def _finished(self, laid: Laid, alike: float, own: Mapping[str, Array]) -> _Found:
+        """Return a laid face with what can be seen of it: laid again with that, in the middle of a recognised face."""
+        model, search = self._model, self._skin.search
+        if sure(alike) < RECOGNISED and len(own) < ENOUGH_TO_START:
+            return _Found(laid, alike, {})
+        lids = self._at_balls(laid)
+        if lids:
+            laid = lay(model, search, laid.frame, {**lids, **own}, BENT[2:], laid.vertices)
+        seen = self._seen(laid)
+        hold = {**lids, **{name: place for name, place in seen.items() if name in model.names}, **own}
+        again = lay(model, search, laid.frame, hold, BENT[-4:], laid.vertices)
+        seen = {name: place for name, place in self._seen(again).items() if name not in own}
+        return _Found(again, max(alike, likeness(model, again, search)), seen)
+
+    def _at_balls(self, laid: Laid) -> dict[str, Array]:
+        """Return the lids, name -> place (3,) on the mesh, where eyeballs lie elsewhere than the laid face has them."""
+        frame, back = laid.frame, laid.frame.inverse()
+        points = dict(zip(self._model.names, self._model.placing @ laid.vertices, strict=True))
+        rest = self._model.points
+        found = {}
+        for s, ball in self._balls.items():
+            lids = [f"eye_{name}_{s}" for name in ("inner", "outer", "upper", "lower")]
+            before_ball = np.mean([rest[name] for name in lids], axis=0) - _BALLS[s]
+            off = back.apply(ball) + before_ball - np.mean([points[name] for name in lids], axis=0)
+            if np.linalg.norm(off[:2]) > _BESIDE_BALL:
+                found |= {name: points[name] + [off[0], off[1], 0.0] for name in lids}
+        if not found:
+            return {}
+        feet = self._skin.search(frame.apply(np.array(list(found.values()))))
+        return dict(zip(found, feet.points, strict=True))
+
+    def _seen(self, laid: Laid) -> dict[str, Array]:
+        """Return what is seen of lids and lips, name -> place (3,) on the mesh."""
+        frame = laid.frame
+        back = frame.inverse()
+        skin = Surface(back.apply(self.mesh.vertices), self._skin.surface.faces)
+        points = dict(zip(self._model.names, self._model.placing @ laid.vertices, strict=True))
+        found = {**lip_line(skin, points), **nose_tip(skin, points)}
+        found |= eye_opening(skin, points, "L") | eye_opening(skin, points, "R")
+        return {name: frame.apply(place) for name, place in found.items()}
+
+    def _best_of(self, frames: list[Similarity], count: int) -> list[Laid]:
+        """Return the faces laid from so many frames, as a whole, that are most alike."""
+        search = self._all.search
+        laid = [lay(self._model, search, frame, {}, WHOLE) for frame in frames]
+        alike = [likeness(self._model, one, search) for one in laid]
+        return [laid[i] for i in np.argsort(alike)[::-1][:count]]
 
     @property
     def face(self) -> float:
         """How surely a face was found without any place known, 0 to 1."""
-        return 0.0 if self._found is None else _sure(self._found[1])
+        return 0.0 if self._start is None else sure(self._start[1])
 
     # -- what does -----------------------------------------------------------------------------------------------------
     def propose(self, known: Mapping[str, Any]) -> Proposals:
@@ -178,19 +249,28 @@ class Proposer:
             if name not in NAMES:
                 raise InputError(f"known: unknown landmark '{name}'{nearest(str(name), NAMES)}")
         at = {name: one.xyz for name, one in given.items()}
-        laid, alike = self._lay(at)
-        sure = 0.0 if laid is None else _sure(alike)
+        found = self._lay(at)
+        laid = None if found is None else found.laid
+        face = 0.0 if found is None else sure(found.alike)
+        believed = 0.0 if found is None else belief(found.alike, len(at))
         plane = self._plane_of(laid)
         places = dict(given)
         if laid is not None:
-            places |= {name: one for name, one in self._from(laid, sure).items() if name not in given}
+            places |= {name: one for name, one in self._from(found, believed).items() if name not in given}
         for name, one in given.items():
             partner = f"{name[:-2]}_{'R' if name.endswith('L') else 'L'}"
             if name.endswith(("_L", "_R")) and partner not in given:
                 places[partner] = self._mirrored(partner, one, plane)
         ordered = {name: places[name] for name in NAMES if name in places}
         ask = next((name for name in ASKED if name not in given), None)
-        return Proposals(ordered, sure, (), ask, self.mesh)
+        first = self._found
+        where = self._where(first.laid) if first is not None and first.alike >= A_FACE else None
+        warnings = (*not_recognised(face, given), *odd_places(given, self.mesh, where))
+        return Proposals(ordered, face, warnings, ask, None if laid is None else laid.frame, self.mesh)
+
+    def _where(self, laid: Laid) -> dict[str, Array]:
+        """Return name -> place (3,) of a laid face's landmarks, in the mesh's axes and units."""
+        return dict(zip(self._model.names, laid.frame.apply(self._model.placing @ laid.vertices), strict=True))
 
     def _given(self, name: str, place: Any) -> Proposal:
         """Return a known place as a proposal."""
@@ -210,62 +290,69 @@ class Proposer:
         if at.shape != (3,) or not np.isfinite(at).all():
             raise InputError(f"known: '{name}' expected a point of three finite numbers or (triangle, barycentric), "
                              f"got {place!r}")
-        feet = self._search(at[None])
-        return Proposal(name, int(self._solid[feet.faces[0]]), feet.weights[0], at, 1.0, "given")
+        feet = self._all.search(at[None])
+        return Proposal(name, int(self._all.rows[feet.faces[0]]), feet.weights[0], at, 1.0, "given")
 
-    def _lay(self, at: Mapping[str, Array]) -> tuple[Laid | None, float]:
-        """Return the face laid with known places (3,) as constraints, and how alike it is."""
-        model = self._model
+    def _lay(self, at: Mapping[str, Array]) -> _Found | None:
+        """Return the face laid with known places (3,) as constraints."""
+        model, found, search = self._model, self._found, self._skin.search
         own = {name: at[name] for name in model.names if name in at}
-        found = self._found
         if not own:
-            return found if found is not None else (None, 0.0)
+            return found
         tries = []
-        if found is not None and self._agree(found[0], own):
-            tries.append(lay(model, self._search, found[0].frame, own, BENT, found[0].vertices))
-        if len(own) >= _ENOUGH or (not tries and len(own) >= 3):
+        if found is not None and self._agree(found.laid, own):
+            if sure(found.alike) >= RECOGNISED:           # what was seen of it stays: an answer at once
+                seen = {name: place for name, place in found.seen.items() if name not in own}
+                hold = {**{name: place for name, place in seen.items() if name in model.names}, **own}
+                laid = lay(model, search, found.laid.frame, hold, BENT[-4:], found.laid.vertices)
+                return _Found(laid, max(found.alike, likeness(model, laid, search)), seen)
+            tries.append(lay(model, search, found.laid.frame, own, BENT[2:], found.laid.vertices))
+        if len(own) >= _ENOUGH:
             try:
                 start = align({name: model.points[name] for name in own}, own)
             except InputError:                          # on one line: they fix no place
                 start = None
             if start is not None:
-                laid = lay(model, self._search, start, own, WHOLE)
-                tries.append(lay(model, self._search, laid.frame, own, BENT, laid.vertices))
+                laid = lay(model, search, start, own, WHOLE)
+                tries.append(lay(model, search, laid.frame, own, BENT, laid.vertices))
         if not tries:
-            return found if found is not None else (None, 0.0)
-        scored = [(likeness(model, laid, self._search), laid) for laid in tries]
+            return found
+        scored = [(likeness(model, laid, search), laid) for laid in tries]
         alike, laid = max(scored, key=lambda one: one[0])
-        return laid, alike
+        return self._finished(laid, alike, own)
 
     def _agree(self, laid: Laid, own: Mapping[str, Array]) -> bool:
         """Return whether known places lie where a laid face has them, by and large."""
-        where = dict(zip(self._model.names, laid.frame.apply(self._model.placing @ laid.vertices), strict=True))
+        where = self._where(laid)
         off = [float(np.linalg.norm(where[name] - place)) / laid.frame.scale for name, place in own.items()]
         return float(np.median(off)) < _ELSEWHERE
 
-    def _from(self, laid: Laid, sure: float) -> dict[str, Proposal]:
-        """Return the places of a laid face's landmarks on the mesh."""
-        model = self._model
+    def _from(self, found: _Found, believed: float) -> dict[str, Proposal]:
+        """Return the places of a laid face's landmarks on the mesh. believed: how far, 0 to 1."""
+        model, laid, skin = self._model, found.laid, self._skin
         x = laid.vertices
         normals = model.placing @ vertex_normals(x, model.surface.faces) @ laid.frame.rotation.T
         points = laid.frame.apply(model.placing @ x)
-        feet = self._search(points, normals, least_cosine=0.2)
-        other = self._search(points)
+        for i, name in enumerate(model.names):
+            points[i] = found.seen.get(name, points[i])
+        feet = skin.search(points, normals, least_cosine=0.2)
+        other = skin.search(points)
         result = {}
         weight = model.placing @ laid.weight
         for i, name in enumerate(model.names):
-            one, k = (feet, i) if feet.faces[i] >= 0 else (other, i)
-            face, weights = int(self._solid[one.faces[k]]), one.weights[k]
-            result[name] = Proposal(name, face, weights, one.points[k], float(sure * weight[i]), "laid")
+            saw = name in found.seen
+            one = feet if feet.faces[i] >= 0 and not saw else other
+            face, weights = int(skin.rows[one.faces[i]]), one.weights[i]
+            share = SEEN if saw else laid_share(name) * min(float(weight[i]), 1.0)
+            result[name] = Proposal(name, face, weights, one.points[i], believed * share, "seen" if saw else "laid")
         return result
 
     def _plane_of(self, laid: Laid | None) -> Plane:
         """Return the plane of symmetry of the head with the laid face."""
         if laid is None:
             return self._planes[0]
-        key = id(laid)
-        if getattr(self, "_plane_key", None) == key:
-            return self._plane_kept
+        if self._plane_kept is not None and self._plane_kept[0] is laid:
+            return self._plane_kept[1]
         frame = laid.frame
         normal = frame.rotation[:, 0]
         middle = frame.apply(_MIDDLE)
@@ -275,7 +362,7 @@ class Proposer:
         if len(samples) > 20:
             some = samples[np.unique(np.linspace(0, len(samples) - 1, 1500).astype(int))]
             plane = follow(cKDTree(samples), some, plane, frame.scale * _HEAD, 8)
-        self._plane_key, self._plane_kept = key, plane
+        self._plane_kept = laid, plane
         return plane
 
     def _mirrored(self, name: str, one: Proposal, plane: Plane) -> Proposal:
@@ -283,10 +370,11 @@ class Proposer:
         at = plane.mirror(one.xyz)
         normal = self._normal(one)
         normal = normal - 2 * (normal @ plane.normal) * plane.normal
-        feet = self._search(at[None], normal[None], least_cosine=0.3)
+        skin = self._skin
+        feet = skin.search(at[None], normal[None], least_cosine=0.3)
         if feet.faces[0] < 0:
-            feet = self._search(at[None])
-        return Proposal(name, int(self._solid[feet.faces[0]]), feet.weights[0], feet.points[0], _MIRRORED, "mirrored")
+            feet = skin.search(at[None])
+        return Proposal(name, int(skin.rows[feet.faces[0]]), feet.weights[0], feet.points[0], _MIRRORED, "mirrored")
 
     def _normal(self, one: Proposal) -> Array:
         a, b, c = self.mesh.vertices[self.mesh.faces[one.face]]
@@ -294,6 +382,11 @@ class Proposer:
         return normal / max(float(np.linalg.norm(normal)), 1e-300)
 
 
-def _sure(alike: float) -> float:
-    """Return how surely a relief that is so much alike is a face's."""
-    return float(np.clip((alike - _NO_FACE) / (_A_FACE - _NO_FACE), 0.0, 1.0))
+def _beside(frame: Similarity) -> Iterator[Similarity]:
+    """Yield frames beside one: larger and smaller, higher and lower. A face that is laid a nose too high stays there,
+    because a brow is alike to a lip."""
+    for size, up in product((0.9, 1.0, 1.1), (-12.0, 0.0, 12.0)):
+        if size != 1.0 or up:
+            middle = frame.apply(_MIDDLE + np.array([0.0, up, 0.0]))
+            scale = frame.scale * size
+            yield Similarity(scale, frame.rotation, middle - scale * frame.rotation @ _MIDDLE)

@@ -13,8 +13,10 @@ import numpy as np
 
 from facegen.errors import FileError, InputError
 from facegen.fileio.avatar import AvatarFile, load_avatar
+from facegen.fileio.obj import ObjFile
 from facegen.fileio.textfile import make_folder, whole_file
 from facegen.studio.limits import MEBIBYTE, Limits
+from facegen.studio.reading import read_avatar_safely
 from facegen.transfer.rig import avatar_files, avatar_names
 
 FOLDER = "avatar"
@@ -25,6 +27,10 @@ TAKEN = (".obj", ".glb", ".vrm", ".ply", ".stl", ".gltf")
 LIMITS = Limits()
 """What is taken at most. An avatar for games has a tenth of the triangles."""
 
+COLOURS = ".mtl"
+"""What the name of an OBJ file's colours ends in."""
+
+_COLOURS = MEBIBYTE     # bytes: colours are a few lines
 _UNSAFE = re.compile(r"[^\w.-]+")
 _LONGEST = 60
 _KEPT = 4               # avatars in memory: those of a few steps of undo
@@ -66,7 +72,7 @@ def safe_name(name: str, taken: tuple[str, ...] = TAKEN, kind: str = "an avatar"
 def keep(folder: Path, name: str, content: bytes) -> str:
     """Keep a file that came from a browser in a work's folder and return its name there; InputError if it is too much.
 
-    It is read before it is kept: what cannot be opened leaves what was there as it was.
+    It is read before it is kept, by a process of its own: what cannot be opened leaves what was there as it was.
     """
     name = safe_name(name)
     if len(content) > LIMITS.file_bytes:
@@ -79,11 +85,50 @@ def keep(folder: Path, name: str, content: bytes) -> str:
         try:
             trial.write_bytes(content)
             with called(trial, name):
-                _check(load_avatar(trial), name)
+                _check(read_avatar_safely(trial, LIMITS), name)
             trial.replace(draft)
         finally:
             trial.unlink(missing_ok=True)
     return name
+
+
+def keep_from(folder: Path, path: Path) -> str:
+    """Keep a copy of a file of this machine, and of its colours, in a work's folder; as `keep`."""
+    name = keep(folder, path.name, path.read_bytes())
+    opened = open_avatar(folder, name)
+    for library in _libraries(opened.avatar):
+        beside = path.parent / library
+        if beside.is_file() and beside.stat().st_size <= _COLOURS:
+            keep_colours(folder, opened, library, beside.read_bytes())
+    return name
+
+
+def keep_colours(folder: Path, opened: Opened, name: str, content: bytes) -> None:
+    """Keep the colours (.mtl) of an OBJ file beside it; InputError if they are not that file's, or too much."""
+    base = str(name).replace("\\", "/").rsplit("/", 1)[-1]
+    if base not in _libraries(opened.avatar):
+        wanted = ", ".join(_libraries(opened.avatar))
+        raise InputError(f"file: '{base[:_LONGEST]}' has no colours of {opened.name}"
+                         + (f", which has them in {wanted}" if wanted else ", which names no file of colours"))
+    if len(content) > _COLOURS:
+        raise InputError(f"file: '{base}' is too large for a list of colours")
+    with whole_file(folder / FOLDER / base, "the colours ") as draft:
+        draft.write_bytes(content)
+    _read.cache_clear()
+
+
+def lost_colours(opened: Opened) -> str | None:
+    """Return the name of the file with an OBJ file's colours, if it is not there."""
+    libraries = _libraries(opened.avatar)
+    return libraries[0] if libraries and not opened.avatar.colours else None
+
+
+def _libraries(avatar: AvatarFile) -> list[str]:
+    """Return the names of files with colours that an OBJ file names and that lie beside it."""
+    lines = avatar.source.libraries if isinstance(avatar.source, ObjFile) else ()
+    names = [name.replace("\\", "/").rsplit("/", 1)[-1] for line in lines for name in (line, *line.split())]
+    return [name for name in dict.fromkeys(names) if name.lower().endswith(COLOURS) and not set(name) & set(":\0")
+            and not name.startswith(".")]
 
 
 @contextmanager
@@ -92,7 +137,7 @@ def called(path: Path, name: str) -> Iterator[None]:
     try:
         yield
     except InputError as error:
-        raise InputError(str(error).replace(str(path), name)) from None
+        raise InputError(str(error).replace(str(path), name).replace(path.name, name)) from None
 
 
 def open_avatar(folder: Path, name: str) -> Opened:
@@ -117,9 +162,6 @@ def _check(avatar: AvatarFile, name: str) -> None:
     mesh = avatar.mesh
     if not len(mesh.faces):
         raise InputError(f"'{name}' has no triangles: there is nothing to put a face on")
-    if len(mesh.faces) > LIMITS.triangles:
-        raise InputError(f"'{name}' has {len(mesh.faces):,} triangles, the studio takes up to {LIMITS.triangles:,}; "
-                         "make fewer of them first (in Blender: the Decimate modifier), or use the command facegen rig")
     used = mesh.vertices[np.unique(mesh.faces)]
     bad = int((~np.isfinite(used).all(axis=1)).sum())
     if bad:

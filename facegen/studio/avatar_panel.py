@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -9,7 +10,17 @@ from typing import Any
 from facegen.face.landmarks import REQUIRED
 from facegen.fileio.textfile import make_folder, save_text
 from facegen.studio import picking
-from facegen.studio.avatar_file import FOLDER, TAKEN, called, keep, open_avatar
+from facegen.studio.avatar_file import (
+    COLOURS,
+    FOLDER,
+    TAKEN,
+    called,
+    keep,
+    keep_colours,
+    keep_from,
+    lost_colours,
+    open_avatar,
+)
 from facegen.studio.avatar_scene import AvatarScene
 from facegen.studio.page import Page
 from facegen.studio.picker_view import PickerView
@@ -32,6 +43,7 @@ class AvatarPanel:
         self.page = page
         self.folder = page.desk.store.folder_of(page.name)
         self.scene = AvatarScene(page)
+        self._last: AvatarWork | None = None        # what is shown
         gui = page.client.gui
         with gui.add_folder("1 Avatar") as self._first:
             self._make_open(gui)
@@ -45,9 +57,14 @@ class AvatarPanel:
     def _make_open(self, gui: Any) -> None:
         calls = self.page.calls
         self._about = gui.add_markdown(_HELP)
-        self._upload = gui.add_upload_button("Open an avatar", mime_type=",".join(TAKEN), hint="A file that ends in "
-                                             f"{', '.join(TAKEN)}. It stays on this machine, beside your work.")
+        self._upload = gui.add_upload_button(
+            "Open an avatar", mime_type=",".join((*TAKEN, COLOURS)), hint=f"A file that ends in {', '.join(TAKEN)}, or "
+            f"the colours of an OBJ file ({COLOURS}). It stays on this machine, beside your work.")
         self._upload.on_upload(calls(self._uploaded))
+        self._shelf = gui.add_dropdown("Or from a folder", (_NONE, *self._on_shelf()), initial_value=_NONE,
+                                       visible=bool(self._on_shelf()),
+                                       hint="Files of the folders that the studio was started with.")
+        self._shelf.on_update(calls(self._taken))
         self._ours = gui.add_dropdown("Or try one", (_NONE, *avatar_names()), initial_value=_NONE,
                                       hint="Heads that come with facegen, still without blendshapes.")
         self._ours.on_update(calls(self._chosen))
@@ -72,31 +89,57 @@ class AvatarPanel:
     # -- what is shown ------------------------------------------------------------------------------------------
     def refresh(self, work: Work) -> None:
         """Show a work."""
-        avatar = work.avatar
-        if self.scene.open(avatar):
-            self.picker.forget()
-            self.rigging.forget()
+        if work.avatar is not self._last:           # a slider of the face that is dragged changes nothing of this
+            self._last = work.avatar
+            if self.scene.open(work.avatar):
+                self.picker.forget()
+                self.rigging.forget()
+        self._refresh_file(work.avatar)
+        self.scene.show(work.avatar, bool(self._seen.value) and not self.rigging.compares)
+        self.picker.refresh(work)
+        self.rigging.refresh(work)
+
+    def _refresh_file(self, avatar: AvatarWork) -> None:
         opened = self.scene.opened
         self._about.content = opened.summary if opened else _HELP
         self._ours.value = avatar.file if avatar.file in avatar_names() else _NONE
+        self._shelf.value = _NONE
         self._up.value, self._front.value = _DIRECTIONS[avatar.up], _DIRECTIONS[avatar.front]
         for handle in (self._seen, self._axes):
             handle.visible = opened is not None
         self._save.disabled = self._clear.disabled = not avatar.landmarks
-        self.scene.show(avatar, bool(self._seen.value) and not self.rigging.compares)
-        self.picker.refresh(work)
-        self.rigging.refresh(work)
+
+    def _again(self) -> None:
+        """Read the avatar again: its file has changed."""
+        self._last = None
+        self.refresh(self.page.work)
 
     # -- step 1 -------------------------------------------------------------------------------------------------
+    def _on_shelf(self) -> tuple[str, ...]:
+        return self.page.desk.shelf.names(TAKEN)
+
     def _uploaded(self) -> None:
         given = self._upload.value
+        if given.name.lower().endswith(COLOURS):
+            self.scene.mesh                                 # noqa: B018 - told if there is no avatar yet
+            keep_colours(self.folder, self.scene.opened, given.name, given.content)
+            self._again()
+        else:
+            self._read(given.name, lambda: keep(self.folder, given.name, given.content))
 
+    def _taken(self) -> None:
+        if self._shelf.value != _NONE:
+            path = self.page.desk.shelf.resolve(self._shelf.value, TAKEN)
+            self._read(path.name, lambda: keep_from(self.folder, path))
+
+    def _read(self, title: str, job: Callable[[], str]) -> None:
+        """Read a file beside the page and open it."""
         def read(report: Any) -> str:
             report("reading", 0.3)
-            return keep(self.folder, given.name, given.content)
+            return job()
 
         with self._first:
-            Task(self.page, given.name[:60], read, self._opened)
+            Task(self.page, title[:60], read, self._opened)
 
     def _chosen(self) -> None:
         if self._ours.value != _NONE:
@@ -110,7 +153,10 @@ class AvatarPanel:
         keeps = self.page.work.avatar
         fresh = AvatarWork(file=name, symmetric=keeps.symmetric, sets=keeps.sets)
         self.page.change(f"open {name}", avatar=self._facing(fresh))
-        self.refresh(self.page.work)                        # the same name may be another file
+        self._again()                                       # the same name may be another file
+        colours = lost_colours(self.scene.opened)
+        if colours is not None:
+            self.page.say(f"They are in {colours}: open that file too.", "Colours are missing")
 
     def _facing(self, avatar: AvatarWork) -> AvatarWork:
         """Return the work with the axes that a file is known to have: VRM 0.x avatars look to -z."""

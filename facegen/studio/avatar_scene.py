@@ -67,6 +67,7 @@ class AvatarScene:
             return name is not None
         another = self.opened is None or found.avatar is not self.opened.avatar
         self.opened = found
+        self._stands = None if another else self._stands
         return another
 
     def show(self, work: AvatarWork, visible: bool) -> None:

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any
 from websockets.asyncio.server import ServerConnection
 from websockets.protocol import State
 
-from facegen.studio.wire import Gate, Refused, UploadStart, read
+from facegen.studio.gate import Gate
+from facegen.studio.wire import Refused, UploadStart, read
 
 if TYPE_CHECKING:
     from facegen.studio.server import StudioServer
@@ -21,12 +22,13 @@ def guarded(server: StudioServer) -> type[ServerConnection]:
     held: set[ServerConnection] = set()
 
     class Guarded(ServerConnection):
-        """A connection. gate: what its page sent so far. refused: how much of that no honest page sends."""
+        """A connection. gate: what its page sent so far. refused: how much of that no honest page sends. away: whether
+        it was sent away for that."""
 
         def __init__(self, *args: Any, **options: Any) -> None:
             super().__init__(*args, **options)
             self.gate = Gate(server.limits, lambda uuid: server.element(self, uuid), server.budget)
-            self.refused = 0
+            self.refused, self.away = 0, False
 
         def connection_made(self, transport: Any) -> None:
             super().connection_made(transport)
@@ -42,9 +44,9 @@ def guarded(server: StudioServer) -> type[ServerConnection]:
             while True:
                 raw = await super().recv(decode)
                 pause = self.gate.wait(len(raw))
+                if self.away or (pause > 0 and self.state is not State.OPEN):
+                    continue        # what is left of a flood is thrown away
                 if pause > 0:       # no more is read meanwhile, so that it is the sender who waits
-                    if self.state is not State.OPEN:
-                        continue    # nobody waits: what is left of a flood is thrown away
                     await asyncio.sleep(pause)
                 try:
                     self.gate.check(raw)

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import random
+import time
 from dataclasses import replace
 
 from facegen.facs.blend import blend
 from facegen.facs.chance import random_expression
+from facegen.studio.chain_view import ChainView
 from facegen.studio.gaze_target import GazeTarget
 from facegen.studio.page import Page
 from facegen.studio.palette import Palette
@@ -16,6 +18,7 @@ from facegen.studio.unit_sliders import UnitSliders
 from facegen.studio.work import FaceWork, Work
 
 _NOBODY = "nobody in particular"
+_LISTED = 1.0           # seconds until folders are looked at again
 _SEEDS = 10_000         # short to write down
 
 
@@ -25,21 +28,22 @@ class FacePanel:
     def __init__(self, page: Page) -> None:
         self.page = page
         gui, face = page.client.gui, page.work.face
-        self._do = gui.add_button_group("", ("By chance", "At rest"),
+        self._do = gui.add_button_group("Start from", ("by chance", "at rest"),
                                         hint="An expression by chance that looks like one; or the face at rest.")
-        self._do.on_click(page.calls(lambda: self._chance() if self._do.value == "By chance" else self._reset()))
+        self._do.on_click(page.calls(lambda: self._chance() if self._do.value == "by chance" else self._reset()))
         self._seed = gui.add_number("Chance", 0, min=0, max=_SEEDS - 1, step=1, visible=False,
                                     hint="The number of this expression by chance: the same number gives the same.")
         self._seed.on_update(page.calls(lambda: self._chance(self._seed.value)))
         self._intensity = gui.add_slider("Intensity", 0.0, 1.0, 0.01, face.intensity, marks=(),
                                          hint="Of all that moves, the gaze at a point apart.")
         self._intensity.on_update(page.calls(self._scaled))
+        self._script = ScriptBox(page)
         self._palette = Palette(page)
         with gui.add_folder("Action units"):
             self._units = UnitSliders(page)
         with gui.add_folder("Where the eyes look"):
             self._gaze = GazeTarget(page)
-        self._script = ScriptBox(page)
+        self._chain = ChainView(page)
         with gui.add_folder("Face and person"):
             self._rig = gui.add_dropdown("Face", page.desk.face_names(page.name), initial_value=face.rig,
                                          hint="Whose face shows it: a parametric face, or an avatar with blendshapes.")
@@ -48,6 +52,7 @@ class FacePanel:
         self._rig.on_update(page.calls(self._other_face))
         self._person.on_update(page.calls(self._other_person))
         self._take = TakeAway(page)
+        self._listed = -_LISTED
         gui.add_command("Expression by chance").on_trigger(page.calls(self._chance))
         gui.add_command("Face at rest").on_trigger(page.calls(self._reset))
 
@@ -84,20 +89,25 @@ class FacePanel:
     def refresh(self, work: Work) -> None:
         """Show a work."""
         face = work.face
-        names = self.page.desk.face_names(self.page.name)
-        if tuple(self._rig.options) != names:
-            self._rig.options = names
+        # Other tabs make faces and people.
+        if time.monotonic() - self._listed > _LISTED or face.rig not in self._rig.options:
+            self._listed = time.monotonic()
+            names, people = self.page.desk.face_names(self.page.name), self._people()
+            if tuple(self._rig.options) != names:
+                self._rig.options = names
+            if tuple(self._person.options) != people:
+                self._person.options = people
         self._rig.value = face.rig
-        if tuple(self._person.options) != self._people():
-            self._person.options = self._people()
         self._person.value = face.person or _NOBODY
         self._intensity.value = face.intensity
         self._palette.refresh(work)
         self._units.refresh(face)
         self._gaze.refresh(face)
         self._script.refresh(work)
+        self._chain.refresh(work)
         self._take.refresh(work)
 
     def close(self) -> None:
-        """End the drawing of thumbnails."""
+        """End what runs beside the page."""
         self._palette.close()
+        self._chain.close()

@@ -71,14 +71,15 @@ class Figure:
             handle.visible = shown
 
     def fade(self, opacity: float | None) -> None:
-        """Let what is inside be seen, or with None no more."""
+        """Let what is inside be seen, or with None no more; one that was taken away is left alone."""
         for handle, _ in self._handles:
             handle.opacity = opacity
 
     def remove(self) -> None:
-        """Take it from the scene."""
+        """Take it from the scene; what is asked of it afterwards does nothing."""
         for handle, _ in self._handles:
             handle.remove()
+        self._handles = []
 
     def pick(self, origin: ArrayLike, direction: ArrayLike) -> Hit | None:
         """Return the place that a ray of the scene meets first, on the vertices last shown."""

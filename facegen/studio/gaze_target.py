@@ -14,7 +14,7 @@ from facegen.studio.work import FaceWork
 _NAME = "/gaze"
 _AHEAD = 180.0          # mm in front of the face: near enough to see, far enough to look at
 _COLOUR = (61, 122, 158)
-_RADIUS, _HANDLES = 0.07, 0.45      # in the scene
+_RADIUS, _HANDLES = 0.055, 0.35      # in the scene
 
 
 class GazeTarget:

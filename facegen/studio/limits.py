@@ -12,15 +12,17 @@ class Limits:
     """The bounds of one server; every one of them is refused or slowed with a line that says so.
 
     pages: pages open at once. works: different works seen by one server. message_bytes: one message of a page; an
-    upload comes in parts of half a mebibyte. file_bytes: one uploaded file. uploads, upload_bytes: uploads of one page
-    under way. messages: messages a second of one page, more are slowed. text: characters of one text of a page.
-    triangles: of an opened avatar. read_seconds, read_bytes: what reading a file may take.
+    upload comes in parts of half a mebibyte. file_bytes: one uploaded file; data_bytes: one of YAML or JSON. uploads,
+    upload_bytes: uploads of one page under way. messages: messages a second of one page, more are slowed. text:
+    characters of one text of a page. triangles: of an opened avatar. read_seconds, read_bytes: what reading one may
+    take.
     """
 
     pages: int = 16
     works: int = 256
     message_bytes: int = 4 * MEBIBYTE
     file_bytes: int = 64 * MEBIBYTE
+    data_bytes: int = MEBIBYTE // 2
     upload_bytes: int = 128 * MEBIBYTE
     uploads: int = 4
     messages: float = 240.0

@@ -28,6 +28,7 @@ log = logging.getLogger("facegen.studio")
 FACE = "face"
 """The figure that shows the page's face."""
 
+_DRAWN = 0.1            # seconds
 _CLOSES = 8.0           # seconds until a notice goes
 
 
@@ -55,6 +56,7 @@ class Page:
         self.stage = Stage(client, self.fault)
         self.rig: Any = None
         self._shown: FaceWork | None = None
+        self._meant: tuple[Any, Resolution] | None = None
         self._panels: list[Panel] = []
         client.gui.configure_theme(show_logo=False, show_share_button=False, control_width="large",
                                    brand_color=(176, 92, 72))
@@ -158,7 +160,10 @@ class Page:
 
     def meaning(self) -> Resolution:
         """Return what the page's face shows."""
-        return self.work.face.meaning(self.person(), self.rig)
+        asked = self.work.face, self.person(), self.rig
+        if self._meant is None or self._meant[0] != asked:
+            self._meant = asked, self.work.face.meaning(*asked[1:])
+        return self._meant[1]
 
     # -- the person ---------------------------------------------------------------------------------------------
     def calls(self, function: Callable[..., None]) -> Callable[[Any], None]:
@@ -178,6 +183,9 @@ class Page:
                 except Exception as error:
                     self.fault(error)
                     self._refresh()                 # what is shown is what is
+            # The next value of a slider that is dragged is taken when this one is drawn: who works out values that
+            # nobody sees takes the time of those that are seen. Not for long: a clip that plays never rests.
+            self.stage.settle(_DRAWN)
 
         return called
 

@@ -32,21 +32,18 @@ class Palette:
         self._buttons: dict[str, Any] = {}
         self._pictures: dict[str, str] = {}
         self._shares: dict[str, Any] = {}
-        self._mixing = False
+        self._chosen_now: frozenset[str] = frozenset()
         gui = page.client.gui
         self._folder = gui.add_folder("Expressions")
         with self._folder:
             self._search = gui.add_text("Search", "", hint="A name or another word for it: joy, crying, smirk")
             self._search.on_update(page.calls(self._searched))
             self._mix = gui.add_checkbox("Click adds to the mixture", False,
-                                         hint="Off: a click shows that expression alone. On: it joins what is shown.")
+                                         hint="Off: a click shows that expression alone. On: it joins what is shown, "
+                                              "or leaves it.")
             self._grid = gui.add_folder(None)
             self._none = gui.add_markdown("", visible=False)
         self._mixture = gui.add_folder("Mixture", visible=False)
-        with self._mixture:
-            clear = gui.add_button("Take the mixture apart", hint="Keeps the units and forgets which names made them.",
-                                   order=1e9)
-            clear.on_click(page.calls(self._forget))
 
     def close(self) -> None:
         """End the drawing of thumbnails."""
@@ -56,8 +53,7 @@ class Palette:
     def _searched(self) -> None:
         found = search(vocabulary(self._person), self._search.value)
         for name, button in self._buttons.items():
-            if button.visible != (name in found):
-                button.visible = name in found
+            button.visible = name in found
         self._none.visible = not found
         if not found:
             self._none.content = (f"Nothing is called *{self._search.value.strip()}*. "
@@ -82,9 +78,6 @@ class Palette:
         units = blend(shares, person=self._page.person())
         self._page.change(label, thing=thing, face=replace(face, units=units, blend=shares))
 
-    def _forget(self) -> None:
-        self._page.change("mixture taken apart", face=replace(self._page.work.face, blend={}))
-
     # -- what is shown ------------------------------------------------------------------------------------------
     def refresh(self, work: Work) -> None:
         """Show a work: its person's words, its face's pictures, its mixture."""
@@ -92,11 +85,14 @@ class Palette:
         person = self._page.person()
         if not self._buttons or person != self._person:
             self._build(person)
+            self._chosen_now = frozenset()
         elif rig is not self._rig:
             self._draw()
         self._rig = rig
-        for name, button in self._buttons.items():
-            self._picture(name, button, on=name in face.blend)
+        for name in self._chosen_now.symmetric_difference(face.blend):
+            if name in self._buttons:
+                self._picture(name, self._buttons[name], on=name in face.blend)
+        self._chosen_now = frozenset(face.blend)
         self._mixed(face)
 
     def _build(self, person: Person | None) -> None:
@@ -113,6 +109,7 @@ class Palette:
                 button = gui.add_button(plain(name), hint=one.about, order=row)
             button.on_click(self._page.calls(partial(self._chosen, name)))
             self._buttons[name] = button
+            self._picture(name, button, on=False)
         self._draw()
         self._searched()
 

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from facegen.face.landmarks import OPTIONAL, REQUIRED
+from facegen.studio import picker_words as words
 from facegen.studio import picking
 from facegen.studio.avatar_scene import AvatarScene
 from facegen.studio.guide import SIZE, guide, room_of, view_of
@@ -15,8 +16,8 @@ from facegen.studio.landmark_words import ORDER, VIEWS, WORDS
 from facegen.studio.latest import Latest
 from facegen.studio.markers import BLUE, GREEN, ORANGE, Mark, Markers
 from facegen.studio.page import Page
-from facegen.studio.picking import CONFIRMED, OPEN, PROPOSED, SKIPPED, place, words_for
-from facegen.studio.proposing import FOUND, Advice, Adviser, adviser_of
+from facegen.studio.picking import place
+from facegen.studio.proposing import Advice, Adviser, adviser_of
 from facegen.studio.work import AvatarWork, Work
 
 _NEXT = "the next one"
@@ -24,7 +25,6 @@ _NEXT = "the next one"
 _BALL, _LARGEST = 0.022, 1.8
 # The least certain proposal is still to be seen.
 _FAINTEST = 0.3
-_SIGNS = {CONFIRMED: "●", PROPOSED: "◐", OPEN: "○", SKIPPED: "–"}
 _EMPTY = np.full((SIZE, SIZE, 3), 236, np.uint8)
 
 
@@ -66,8 +66,6 @@ class PickerView:
         self._skip.on_click(calls(self._skip_one))
         self._rest = gui.add_button("Skip the optional points", color="gray")
         self._rest.on_click(calls(self._skip_rest))
-        self._undo = gui.add_button("Undo", color="gray")
-        self._undo.on_click(calls(self.page.undo))
         self._faults = gui.add_markdown("", visible=False)
         labels = [_NEXT, *(WORDS[name].label for name in ORDER)]
         self._point = gui.add_dropdown("Point", labels, initial_value=_NEXT, hint="Choose a point to place it "
@@ -95,10 +93,6 @@ class PickerView:
         """Whether a face is still being looked for."""
         return self._adviser is None or not self._adviser.ready
 
-    def _found(self, avatar: AvatarWork) -> bool:
-        """Whether a face was found before any point was placed."""
-        return not avatar.landmarks and self.proposals.sure >= FOUND
-
     def start(self) -> None:
         """Begin to place points."""
         self._on.value = True
@@ -118,7 +112,8 @@ class PickerView:
 
     def refresh(self, work: Work) -> None:
         """Show a work."""
-        stamp = (work.avatar, self.scene.figure, self.on, self.proposals, self.chosen, self.page.history.undoes)
+        self._both.value = work.avatar.symmetric
+        stamp = (work.avatar, self.scene.figure, self.on, self.proposals, self.chosen)
         if stamp == self._stamp:                # a slider of the face that is dragged changes nothing of this
             return
         self._stamp = stamp
@@ -129,52 +124,27 @@ class PickerView:
     def show(self, avatar: AvatarWork) -> None:
         """Show points, proposals and what is asked for."""
         on, name = self.on, self.wanted(avatar)
-        self._show_words(avatar, name, on)
-        self._both.value = avatar.symmetric
         self._point.value = _NEXT if self.chosen is None else WORDS[self.chosen].label
+        self._ask.content = words.question(avatar, name, self.proposals, on=on, looks=self._looks)
+        self._bar.value = 100.0 * words.done(avatar) / len(REQUIRED)
         proposed = name in self.proposals.places and name not in avatar.landmarks
         for handle, visible in (
                 (self._take, on and proposed), (self._all, on and bool(self._open_proposals(avatar))),
                 (self._skip, on and name in OPTIONAL and name not in avatar.landmarks),
                 (self._rest, on and name in OPTIONAL), (self._remove, on and name in avatar.landmarks),
                 (self._point, on), (self._both, on), (self._follow, on), (self._look, on), (self._bar, on),
-                (self._guide, on and name is not None), (self._undo, on)):
+                (self._guide, on and name is not None)):
             handle.visible = visible
         self._all.label = f"Take all proposals ({len(self._open_proposals(avatar))})"
-        self._undo.disabled = self.page.history.undoes is None
-        self._show_faults(on)
-        self._list.content = self._listed(avatar)
+        self._faults.content = words.faults(self.proposals)
+        self._faults.visible = on and bool(self._faults.content)
+        self._list.content = words.listed(avatar, self.proposals.places)
         if on and name is not None and name != self._shown:
             self._shown = name
             self._drawing.ask(lambda: self._draw_guide(name))
         if on:
             self._turn(avatar, name)
         self._show_marks(avatar, name, on)
-
-    def _show_words(self, avatar: AvatarWork, name: str | None, on: bool) -> None:
-        done = sum(each in avatar.landmarks for each in REQUIRED)
-        self._bar.value = 100.0 * done / len(REQUIRED)
-        if not on:
-            self._ask.content = f"{done} of {len(REQUIRED)} points are placed." if avatar.landmarks else ""
-        elif name is None:
-            self._ask.content = "All points are placed: go on to **3 Blendshapes**, or click on a ball to move it."
-        elif self._looks and not avatar.landmarks:
-            self._ask.content = (f"**{WORDS[name].label}**\n\n{WORDS[name].where}\n\nfacegen is looking for a face "
-                                 "meanwhile ...")
-        elif self._found(avatar):
-            self._ask.content = ("**A face was found.** Look at the blue balls: drag those that are not right, then "
-                                 f"take them all. Or click one by one: {WORDS[name].label}. {WORDS[name].where}")
-        else:
-            what = "needed" if name in REQUIRED else "optional"
-            again = " It is placed; click to move it." if name in avatar.landmarks else ""
-            self._ask.content = (f"**{WORDS[name].label}** ({what}; {done} of {len(REQUIRED)} needed points are "
-                                 f"placed)\n\n{WORDS[name].where}{again}")
-
-    def _show_faults(self, on: bool) -> None:
-        lines = [f"- ⛔ {words_for(each)}" for each in self.proposals.errors]
-        lines += [f"- ⚠ {words_for(each)}" for each in self.proposals.warnings]
-        self._faults.content = "\n".join(lines)
-        self._faults.visible = on and bool(lines)
 
     def _show_marks(self, avatar: AvatarWork, wanted: str | None, on: bool) -> None:
         marks: dict[str, Mark] = {}
@@ -191,17 +161,6 @@ class PickerView:
         return {name: one for name, one in self.proposals.places.items()
                 if name not in avatar.landmarks and not avatar.skipped.get(name)}
 
-    def _listed(self, avatar: AvatarWork) -> str:
-        lines = []
-        for part, label in VIEWS.items():
-            names = [name for name in ORDER if WORDS[name].part == part]
-            lines.append(f"**{label}**\n")
-            lines += [f"- {_SIGNS[state]} {WORDS[name].label}"
-                      f"{'' if name in REQUIRED else ' (optional)'}: {state}"
-                      for name in names for state in [picking.state(avatar, name, self.proposals.places)]]
-            lines.append("")
-        return "\n".join(lines)
-
     def _draw_guide(self, name: str) -> None:
         picture = guide(name)
         with self.page.lock:
@@ -212,7 +171,7 @@ class PickerView:
     def _turn(self, avatar: AvatarWork, name: str | None) -> None:
         """Turn the picture to the part of the point that is asked for, once."""
         # A face that was found is looked at as a whole first.
-        whole = name is None or (self._found(avatar) and self.chosen is None)
+        whole = name is None or (words.is_found(avatar, self.proposals) and self.chosen is None)
         part = "whole" if whole else WORDS[name].part
         name = None if whole else name
         known = name in avatar.landmarks or name in self.proposals.places
@@ -320,14 +279,10 @@ class PickerView:
         if not self.on or known == self._known:
             return
         self._known = known
-
-        def think() -> None:
-            adviser = self._advise()
-            if not adviser.ready:
-                self._advised(known, adviser.first(avatar))
-            self._advised(known, adviser.advice(avatar))
-
-        self._thinking.ask(think)
+        adviser = self._advise()
+        if not adviser.ready:                               # while a face is looked for mirroring says something
+            self.proposals = adviser.first(avatar)
+        self._thinking.ask(lambda: self._advised(known, adviser.advice(avatar)))
 
     def _advised(self, known: Any, advice: Advice) -> None:
         """Show advice, if the points are still those that it is of."""

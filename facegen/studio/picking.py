@@ -6,7 +6,8 @@ page's. A place is {"face": triangle, "barycentric": [a, b, c]}.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+import re
+from collections.abc import Container, Iterable, Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -75,7 +76,7 @@ def wanted(work: AvatarWork, *, chosen: str | None = None, advised: str | None =
     return advised if advised in left else next(iter(left), None)
 
 
-def state(work: AvatarWork, name: str, proposed: Iterable[str] = ()) -> str:
+def state(work: AvatarWork, name: str, proposed: Container[str] = ()) -> str:
     """Return the state of a point. proposed: names that have a proposal."""
     if name in work.landmarks:
         return CONFIRMED
@@ -152,4 +153,6 @@ def words_for(text: str) -> str:
     """Return a message with the words that the studio uses instead of landmarks' names."""
     for name in sorted(WORDS, key=len, reverse=True):
         text = text.replace(f"'{name}'", f"**{WORDS[name].label}**")
+        if "_" in name:                         # others are words: a chin may be spoken of
+            text = re.sub(rf"\b{name}\b", f"**{WORDS[name].label}**", text)
     return text[:1].upper() + text[1:]

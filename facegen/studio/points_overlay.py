@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from facegen.face.face import Face
 from facegen.face.region_map import RegionMap, region_map
 from facegen.geometry.normals import vertex_normals
-from facegen.studio.figure import Figure
+from facegen.studio.figure import SCALE, Figure
 
 Array = NDArray[np.float64]
 
@@ -24,12 +24,14 @@ REGIONS = ("hidden", "borders", "tinted")
 """How regions are shown."""
 
 # sRGB.
-_MOVABLE, _FIXED, _MOVED, _CHOSEN = (205, 82, 58), (130, 132, 138), (36, 104, 178), (255, 196, 0)
+_MOVABLE, _FIXED, _MOVED, _CHOSEN = (176, 16, 8), (90, 92, 98), (8, 60, 150), (255, 190, 0)
 _BORDER, _CENTRE = (52, 58, 72), (40, 120, 90)
 _TINTS = ((196, 84, 60), (66, 128, 190), (232, 184, 74), (96, 158, 98), (150, 98, 170), (90, 176, 178))
-_SIZE, _FEWER, _CHOSEN_SIZE = 1.0, 1.8, 1.5     # mm: of a point on a face of many, of few; the chosen one is larger
+_SIZE, _FEWER, _CHOSEN_SIZE = 1.15, 1.8, 1.5     # mm: of a point on a face of many, of few; the chosen one is larger
 _MANY = 40
+_GRIP = 1.8             # times a point's size: so near the mouse takes it
 _TINTED = 0.45          # opacity
+_THROUGH = 0.6          # opacity of the skin while what lies inside is shown
 _PROUD = 0.25           # mm that tints and borders stand before the skin, so that they are not lost in it
 _BESIDE = np.array([2.0, 2.0, 3.0])
 _AXIS = 85.0            # mm of the jaw's axis to either side
@@ -52,12 +54,14 @@ class PointsOverlay:
         self._scene, self._clicked, self._grabbed = scene, clicked, grabbed
         self._lock = threading.RLock()                  # pages change it, the stage's thread moves it
         self._points: Any = None
+        self._grips: Any = None                         # round the points, not seen: what the mouse finds
         self._label: Any = None
         self._borders: Any = None
         self._tints: list[tuple[Any, NDArray[np.int64]]] = []
         self._inner: list[tuple[Any, Array]] = []
         self._chosen: str | None = None
         self._moved: frozenset[str] = frozenset()
+        self._marked: Any = None
         self._rigid = self._skull()
 
     def places(self, vertices: Array | None = None) -> dict[str, Array]:
@@ -71,7 +75,8 @@ class PointsOverlay:
                 self._add_points()
             elif not shown and self._points is not None:
                 self._points.remove()
-                self._points = None
+                self._grips.remove()
+                self._points = self._grips = None
             self._dress()
 
     def show_regions(self, how: str) -> None:
@@ -93,18 +98,21 @@ class PointsOverlay:
     def show_inner(self, shown: bool) -> None:
         """Show or hide the centre O and the jaw's axis; the skin is let through while they are."""
         with self._lock:
+            if shown == bool(self._inner):
+                return
             for handle, _ in self._inner:
                 handle.remove()
             self._inner = []
             if shown:
                 self._add_inner()
-            self.figure.fade(0.6 if shown else None)
+            self.figure.fade(_THROUGH if shown else None)
 
     def choose(self, name: str | None, moved: frozenset[str], said: str = "") -> None:
         """Mark a point with its name, and those that were moved by hand."""
         with self._lock:
-            if (name, moved, said) == (self._chosen, self._moved, getattr(self._label, "text", "")):
+            if (name, moved, said, self._points is None) == self._marked:
                 return
+            self._marked = name, moved, said, self._points is None
             self._chosen, self._moved = name, moved
             if self._label is not None:
                 self._label.remove()
@@ -121,7 +129,8 @@ class PointsOverlay:
                 return
             places = self.places(vertices)
             if self._points is not None:
-                self._points.batched_positions = self.figure.place(np.array(list(places.values())))
+                self._points.batched_positions = self._grips.batched_positions = \
+                    self.figure.place(np.array(list(places.values())))
             if self._label is not None:
                 self._label.position = self._beside(places[self._chosen])
             if self._borders is not None:
@@ -145,15 +154,20 @@ class PointsOverlay:
 
     # -- inside -------------------------------------------------------------------------------------------------
     def _add_points(self) -> None:
+        size = (_FEWER if len(self.names) < _MANY else _SIZE) * SCALE
+        self._points = self._balls("points", size, batched_colors=self._colours())
+        self._grips = self._balls("grips", _GRIP * size, opacity=0.0)
+        self._grips.on_click(self._clicked)
+        self._grips.on_drag(self._grabbed)
+
+    def _balls(self, name: str, size: float, **look: Any) -> Any:
+        """Return a ball for each point."""
         vertices, faces = _ball()
-        size = (_FEWER if len(self.names) < _MANY else _SIZE) * 0.01
         at = self.figure.place(np.array(list(self.places().values())))
-        self._points = self._scene.add_batched_meshes_simple(
-            "/points/points", vertices * size, faces, batched_wxyzs=np.tile([1.0, 0.0, 0.0, 0.0], (len(at), 1)),
-            batched_positions=at, batched_scales=np.ones(len(at)), batched_colors=self._colours(), lod="off",
-            flat_shading=False, cast_shadow=False, receive_shadow=False)
-        self._points.on_click(self._clicked)
-        self._points.on_drag(self._grabbed)
+        return self._scene.add_batched_meshes_simple(
+            f"/points/{name}", vertices * size, faces, batched_wxyzs=np.tile([1.0, 0.0, 0.0, 0.0], (len(at), 1)),
+            batched_positions=at, batched_scales=np.ones(len(at)), lod="off", cast_shadow=False, receive_shadow=False,
+            **look)
 
     def _dress(self) -> None:
         if self._points is not None:

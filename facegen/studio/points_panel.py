@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -93,12 +94,13 @@ class PointsPanel:
         self._base.visible = self._paper.visible = face is None
         self._numbers.show(raw, face)
         if face is None:
-            self._told.content = _AVATAR.format(name=work.face.rig)
+            self._told.content, self._says.content = _AVATAR.format(name=work.face.rig), ""
             return
         strange = raws.strangers(raw, face)
         self._told.content = _HOW if not strange else (
-            f"{_HOW}\n\n**{len(strange)} of the moved points are not on this face** ({', '.join(strange[:4])}"
-            f"{' ...' if len(strange) > 4 else ''}); choose another face, or *Put back: all points*.")
+            f"{_HOW}\n\n**{len(strange)} of the moved points are not on this face and left out** "
+            f"({', '.join(strange[:4])}{' ...' if len(strange) > 4 else ''}); choose another face, or *Put back: all "
+            "points*.")
         self._units.value = _UNITS[raws.deformation_of(raw).units]
         point = self._chosen
         vector = raws.vector_of(raw, face, point) if point else np.zeros(3)
@@ -171,10 +173,10 @@ class PointsPanel:
 
     def _from_rest(self, work: Work, point: str) -> float:
         face = self._face
-        person = self.page.desk.person(work.face.person, self.page.name)
-        grip = Grip(face, point)
-        rest = face.feature_point_places(face.mesh().vertices)[point]
-        return float(np.linalg.norm(grip.places(raws.controls_of(work.face, face, person), np.zeros(3))[0] - rest))
+        person = self.page.person()
+        grip = _grip(face, point)
+        rest = face.point_weights()[[grip.row]] @ face.mesh().vertices
+        return float(np.linalg.norm(grip.places(raws.controls_of(work.face, face, person), np.zeros(3)) - rest))
 
     # -- points -------------------------------------------------------------------------------------------------
     def _choose(self, point: str | None) -> None:
@@ -212,7 +214,7 @@ class PointsPanel:
         if event.phase == "end":
             self._drag = None
         target = overlay.figure.unplace(event.end_position) + offset
-        person = self.page.desk.person(work.person, self.page.name)
+        person = self.page.person()
         moved = raws.dragged(work, face, person, name, target, mirrored=self._mirrored.value, grip=grip)
         self.page.change(f"drag {name}", thing=f"point {name}", face=replace(work, raw=moved))
 
@@ -259,8 +261,8 @@ class PointsPanel:
         deformation = raws.deformation_of(work.raw)
         about = f"Made by hand on the face {work.rig}."
         if self._what.value == _WHAT[1]:
-            meaning = work.meaning(self.page.desk.person(work.person, self.page.name))
-            deformation = whole_pose(face, meaning.deformation, *meaning.more, units=deformation.units)
+            meaning = self.page.meaning()
+            deformation = raws.whole_pose(face, meaning.deformation, *meaning.more, units=deformation.units)
             about = f"{work.script}, and what was moved by hand on the face {work.rig}."
         if not deformation:
             raise InputError("file: nothing is moved here yet, so there is nothing to save")
@@ -292,19 +294,9 @@ def said(point: str, face: Face) -> str:
     return words[0].upper() + words[1:] + (f" ({paper})" if paper else "")
 
 
-def whole_pose(face: Face | None, *several: Deformation, units: str) -> Deformation:
-    """Return a sum of movements in one unit of length, without points that the face lacks or that take no vector.
-
-    face: None for an avatar, which cannot convert lengths: InputError if they differ.
-    """
-    if face is None:
-        total = several[0]
-        for one in several[1:]:
-            total = total + one
-        return total
-    total = face.total(*several, units=units)
-    strange = raws.strangers(total.as_dict(), face)
-    return replace(total, points={name: one for name, one in total.points.items() if name not in strange})
+@lru_cache(maxsize=8)
+def _grip(face: Face, point: str) -> Grip:
+    return Grip(face, point)
 
 
 def read_raw(name: str, content: bytes) -> raws.Raw:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import threading
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from functools import lru_cache
+from functools import cached_property, lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -67,8 +67,14 @@ class Adviser:
         self._lock = threading.Lock()
         used = mesh.vertices[np.unique(mesh.faces)]
         self._middle = (used.min(axis=0) + used.max(axis=0)) / 2
-        self._closest = ClosestPoints(Surface(mesh.vertices, mesh.faces))
-        self._proposer = Proposer(mesh)
+
+    @cached_property
+    def _closest(self) -> ClosestPoints:
+        return ClosestPoints(Surface(self.mesh.vertices, self.mesh.faces))
+
+    @cached_property
+    def _proposer(self) -> Proposer:
+        return Proposer(self.mesh)
 
     def first(self, work: AvatarWork) -> Advice:
         """Return at once what mirroring says: the face is still being looked for."""

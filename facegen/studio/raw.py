@@ -62,9 +62,8 @@ def with_vector(raw: Raw, face: Face, point: str, vector: ArrayLike, *, mirrored
     return _plain(replace(found, points=points))
 
 
-def number_of(raw: Raw, face: Face | None, kind: str, key: str) -> float:
-    """Return a number of jaw, lids, eyes or head: mm (on a face), degrees or a share."""
-    found = deformation_of(raw)
+def number_of(found: Deformation, face: Face | None, kind: str, key: str) -> float:
+    """Return a number of jaw, lids, eyes or head of raw data: mm (on a face), degrees or a share."""
     value = getattr(found, kind).get(key, 0.0)
     if (kind, key) in _LENGTHS and face is not None and value:
         one = face.total(Deformation(**{kind: {key: value}}, units=found.units))
@@ -114,15 +113,14 @@ def dragged(work: FaceWork, face: Face, person: Person | None, point: str, targe
 
 def controls_of(work: FaceWork, face: Face, person: Person | None) -> Controls:
     """Return the deformer's input for a work."""
-    meaning = work.meaning(person)
+    meaning = work.meaning(person, face)
     return face.controls(meaning.deformation, *meaning.more, strict=False)
 
 
 def strangers(raw: Raw, face: Face) -> tuple[str, ...]:
     """Return the feature points in raw data that a face has not, or that take no vector there."""
-    known = {name for name, takes in zip(face.feature_points, face.takes_input, strict=True) if takes}
-    known |= {alias for name, alias in face.paper_names.items() if name in known}
-    return tuple(name for name in deformation_of(raw).points if name not in known)
+    found = deformation_of(raw)
+    return tuple(name for name in found.points if name not in face.possible(found).points)
 
 
 def with_own_names(raw: Raw, face: Face) -> Raw:
@@ -131,6 +129,19 @@ def with_own_names(raw: Raw, face: Face) -> Raw:
     if not set(found.points) & set(names):
         return _plain(found)
     return _plain(replace(found, points={names.get(name, name): one for name, one in found.points.items()}))
+
+
+def whole_pose(face: Face | None, *several: Deformation, units: str) -> Deformation:
+    """Return a sum of movements in one unit of length, without points and folds that the face lacks.
+
+    face: None for an avatar, which cannot convert lengths: InputError if they differ.
+    """
+    if face is None:
+        total = several[0]
+        for one in several[1:]:
+            total = total + one
+        return total
+    return face.possible(face.total(*several, units=units))
 
 
 def _plain(found: Deformation) -> dict[str, Any]:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from facegen.face.face import Face
-from facegen.studio.raw import Raw, number_of
+from facegen.studio.raw import Raw, deformation_of, number_of
 
 
 @dataclass(frozen=True)
@@ -58,8 +58,9 @@ class RawSliders:
 
     def show(self, raw: Raw, face: Face | None) -> None:
         """Show raw data. face: None for an avatar, which has no millimetres of its own to say lengths in."""
+        found = deformation_of(raw)
         for one, slider in self._sliders:
             slider.disabled = one.length and face is None
-            value = min(max(number_of(raw, face, one.kind, one.key), one.low), one.high)
+            value = min(max(number_of(found, face, one.kind, one.key), one.low), one.high)
             if abs(slider.value - value) > one.step / 100:
                 slider.value = value

@@ -1,4 +1,4 @@
-"""Files of strangers, read in a process of its own: with little memory, for a short time, and nothing of it stays.
+"""A stranger's avatar, read in a process of its own: with little memory, for a short time, and nothing of it stays.
 
 The readers of facegen.fileio check what they read. This is for what they might not know: a file that makes them slow or
 hungry ends its own process, and no page.
@@ -14,7 +14,6 @@ import os
 import pickle
 import subprocess
 import sys
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -46,21 +45,13 @@ def read_avatar_safely(path: str | os.PathLike[str], limits: Limits | None = Non
     path = Path(path)
     if path.suffix.lower() not in READABLE:
         return load_avatar(path)        # which says what it reads
-    return _Answers(io.BytesIO(_asked("avatar", path, limits or Limits()))).load()
+    return _Answers(io.BytesIO(_asked(path, limits or Limits()))).load()
 
 
-def read_data_safely(path: str | os.PathLike[str], limits: Limits | None = None) -> Any:
-    """Return what a YAML or JSON file holds, read by another process with bounds on its time and memory.
-
-    Raises FileError or TableError as `facegen.facs.yamlfile.read_data` does, and FileError where it takes too long.
-    """
-    return json.loads(_asked("data", Path(path), limits or Limits()))
-
-
-def _asked(what: str, path: Path, limits: Limits) -> bytes:
+def _asked(path: Path, limits: Limits) -> bytes:
     """Have another process read a file; return its answer, or raise the error that it tells of."""
-    wish = json.dumps({"what": what, "path": str(path), "triangles": limits.triangles,
-                       "seconds": limits.read_seconds, "bytes": limits.read_bytes})
+    wish = json.dumps({"path": str(path), "triangles": limits.triangles, "seconds": limits.read_seconds,
+                       "bytes": limits.read_bytes})
     environment = {**os.environ, "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "PYTHONWARNINGS": "ignore",
                    "PYTHONDONTWRITEBYTECODE": "1"}
     try:        # -P: nothing is imported from the folder that the studio was started in
@@ -107,10 +98,9 @@ def answer() -> None:
     _bound(wish["seconds"], wish["bytes"])
     out = sys.stdout.buffer
     sys.stdout = sys.stderr         # nothing else may write there
-    read: dict[str, Callable[[Path, int], bytes]] = {"avatar": _avatar, "data": _data}
     path = Path(wish["path"])
     try:
-        found = b"found\n" + read[wish["what"]](path, wish["triangles"])
+        found = b"found\n" + _avatar(path, wish["triangles"])
     except MemoryError:
         sys.exit(3)
     except FileError as error:
@@ -143,14 +133,8 @@ def _avatar(path: Path, most: int) -> bytes:
 
 
 def _too_many(path: Path, count: int, most: int) -> FileError:
-    return FileError(f"{path}: has {count:,} triangles; the studio opens avatars of up to {most:,}. Simplify it, "
-                     "or use facegen's commands")
-
-
-def _data(path: Path, _: int) -> bytes:
-    from facegen.facs.yamlfile import read_data
-
-    return json.dumps(read_data(path)).encode()
+    return FileError(f"{path}: has {count:,} triangles, the studio takes up to {most:,}; make fewer of them first (in "
+                     "Blender: the Decimate modifier), or use the command facegen rig")
 
 
 def _bound(seconds: float, size: int) -> None:

@@ -20,7 +20,7 @@ from facegen.studio.avatar_checks import set_names
 from facegen.studio.avatar_file import FOLDER, Opened
 from facegen.studio.desk import FACES
 from facegen.studio.landmark_words import WORDS
-from facegen.studio.picking import as_landmarks, file_text, missing
+from facegen.studio.picking import as_landmarks, file_text, missing, words_for
 from facegen.studio.work import AvatarWork
 from facegen.transfer.alignment import align
 from facegen.transfer.apart import take_apart
@@ -57,7 +57,7 @@ class RigMaker:
             made = self._rigging(work, opened, report).save(
                 make_folder(path.parent) / path.name, weights=dict(work.weights) or None, opening=work.opening,
                 lid_closure=work.lid_closure, progress=report)
-            save_text(key(work, opened), self._note(opened))
+            save_text(f"{opened.avatar.digest}\n{key(work, opened)}", self._note(opened))
             return made
 
     def tune(self, work: AvatarWork, opened: Opened, weights: Mapping[str, float]) -> tuple[Array, Transferred]:
@@ -76,10 +76,17 @@ class RigMaker:
         """Return where the avatar with blendshapes is or will be."""
         return self.folder / FACES / opened.output
 
+    def is_there(self, opened: Opened) -> bool:
+        """Return whether the avatar's file with blendshapes is there, whatever they were made by."""
+        return self._noted(opened)[0] == opened.avatar.digest
+
     def is_made(self, work: AvatarWork, opened: Opened) -> bool:
         """Return whether the file is there and is what this work makes."""
+        return self._noted(opened) == [opened.avatar.digest, key(work, opened)]
+
+    def _noted(self, opened: Opened) -> list[str]:
         note = self._note(opened)
-        return self.path(opened).is_file() and note.is_file() and note.read_text() == key(work, opened)
+        return note.read_text().split("\n") if self.path(opened).is_file() and note.is_file() else [""]
 
     def _note(self, opened: Opened) -> Path:
         return self.folder / FOLDER / f"{opened.output}.made"
@@ -91,8 +98,11 @@ class RigMaker:
             report("reading the avatar", 0.0)
             marks = make_folder(self.folder / FOLDER) / f"{opened.output}.landmarks.yaml"
             save_text(file_text(work, opened.avatar.digest), marks)
-            self._laid = now, Rigging(opened.path, landmarks=marks, sets=set_names(work.sets),
-                                      pieces=dict(work.pieces))
+            try:
+                made = Rigging(opened.path, landmarks=marks, sets=set_names(work.sets), pieces=dict(work.pieces))
+            except InputError as error:             # of a file that the person never sees
+                raise InputError(words_for(str(error).removeprefix(f"{marks}: "))) from None
+            self._laid = now, made
         return self._laid[1]
 
 
@@ -134,6 +144,6 @@ def pieces(work: AvatarWork, opened: Opened) -> list[dict[str, object]]:
     return sorted(describe(found.pieces), key=lambda row: -row["triangles"])
 
 
-def preview(face: AvatarFace, folder: Path, opened: Opened) -> Path:
+def preview(face: AvatarFace, folder: Path, opened: Opened, report: Report) -> Path:
     """Draw the sheet of a rigged avatar and return its file."""
-    return save_preview(face, make_folder(folder / FOLDER) / f"{Path(opened.output).stem}.png")
+    return save_preview(face, make_folder(folder / FOLDER) / f"{Path(opened.output).stem}.png", progress=report)

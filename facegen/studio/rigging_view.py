@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -17,7 +18,7 @@ from facegen.studio.avatar_checks import set_names
 from facegen.studio.avatar_file import Opened
 from facegen.studio.avatar_scene import BESIDE, AvatarScene
 from facegen.studio.latest import Latest
-from facegen.studio.page import Page
+from facegen.studio.page import FACE, Page
 from facegen.studio.picking import words_for
 from facegen.studio.pieces_view import PiecesView
 from facegen.studio.task import Task
@@ -103,12 +104,16 @@ class RiggingView:
             self._find(opened)
             self._stamp = (work.avatar, opened, self._face, self.task)
             self._refresh_controls(work.avatar)
+        chosen = set_names(work.avatar.sets)
+        for name, box in self._sets.items():
+            box.value = name in chosen
+        self.tuning.refresh(work.avatar)
         self._use.disabled = opened is not None and work.face.rig == opened.output
         self._show(work)
 
     def _find(self, opened: Opened | None) -> None:
         """Have what was made before the page was loaded again."""
-        if self._face is None and self._current:
+        if self._face is None and opened is not None and self.maker.is_there(opened):
             try:
                 self._face = self.page.desk.face(opened.output, self.page.name)
             except FacegenError as error:
@@ -116,9 +121,6 @@ class RiggingView:
 
     def _refresh_controls(self, avatar: AvatarWork) -> None:
         opened, made = self.scene.opened, self._face is not None
-        chosen = set_names(avatar.sets)
-        for name, box in self._sets.items():
-            box.value = name in chosen
         left = len(rigging.missing(avatar))
         self._place.visible = self.task is not None
         self._rig.disabled = self.task is not None or opened is None or bool(left)
@@ -129,7 +131,6 @@ class RiggingView:
             handle.visible = made
         self._told.content = "\n".join(f"- ⚠ {words_for(each)}" for each in self._warnings)
         self._told.visible = bool(self._warnings)
-        self.tuning.refresh(avatar)
         self._split_pieces(avatar)
 
     def _show(self, work: Work) -> None:
@@ -138,7 +139,9 @@ class RiggingView:
         if not self.compares:
             for name in (RIGGED, TEMPLATE):
                 stage.remove(name)
-            self._seen = None
+            if self._seen is not None:              # what was looked at ends
+                self._seen = None
+                self.page.show_face()
             return
         if RIGGED not in stage.figures:
             self._stand(self._face.mesh())
@@ -162,12 +165,17 @@ class RiggingView:
         if wanted == self._seen:
             return
         self._seen = wanted
-        meaning = load_face().resolve(face) if isinstance(face, str) else face.meaning()
+        if self.tuning.look is None:
+            meaning = face.meaning()
+            self.page.show_face()
+        else:
+            meaning, own = load_face().resolve(face), self.page.rig
+            self.page.stage.request(FACE, lambda: own.pose(meaning))
         if TEMPLATE in self.page.stage.figures:
             base = self.page.desk.face(FaceWork().rig, self.page.name)
             self.page.stage.request(TEMPLATE, lambda: base.pose(meaning))
         rigged, opened = self._face, self.scene.opened
-        if self._current:
+        if self._current or rigging.missing(work.avatar):
             if self.page.stage.figures[RIGGED].mesh is not rigged.mesh():
                 self._stand(rigged.mesh())
             self.page.stage.request(RIGGED, lambda: rigged.pose(meaning))
@@ -260,18 +268,15 @@ class RiggingView:
         self.page.stage.look()
 
     def _take(self) -> None:
-        path = self.maker.path(self.scene.opened)
+        self._send(self.maker.path(self.scene.opened))
+
+    def _send(self, path: Path) -> None:
         self.page.client.send_file_download(path.name, path.read_bytes(), save_immediately=True)
 
     def _draw(self) -> None:
         face, opened, folder = self._face, self.scene.opened, self.maker.folder
 
-        def draw(report: Any) -> Any:
-            report("drawing", 0.1)
-            return rigging.preview(face, folder, opened)
-
-        self._run("Sheet", draw, lambda path: self.page.client.send_file_download(
-            path.name, path.read_bytes(), save_immediately=True))
+        self._run("Sheet", lambda report: rigging.preview(face, folder, opened, report), self._send)
 
     def settle(self) -> bool:
         """Wait for what runs beside the page."""

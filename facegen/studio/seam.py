@@ -12,8 +12,8 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from facegen.studio.gate import Element
 from facegen.studio.needs import VERSION, import_viser
-from facegen.studio.wire import Element
 
 if TYPE_CHECKING:
     import socket
@@ -108,8 +108,11 @@ def element(server: viser.ViserServer, client: viser.ClientHandle | None, uuid: 
         handle = gui._gui_input_handle_from_uuid.get(uuid)
         if handle is not None and not handle._impl.removed:
             state, props = handle._impl, handle._impl.props
+            if isinstance(handle, viser.GuiUploadButtonHandle):
+                kinds = [kind.strip().lower() for kind in props.mime_type.split(",")]
+                return Element(files=tuple(kinds) if all(kind.startswith(".") for kind in kinds) else ())
             return Element(state.value, getattr(props, "min", None), getattr(props, "max", None),
-                           getattr(props, "options", None), isinstance(handle, viser.GuiUploadButtonHandle))
+                           getattr(props, "options", None))
     return None
 
 

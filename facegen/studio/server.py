@@ -28,7 +28,8 @@ if TYPE_CHECKING:
     from websockets.asyncio.server import ServerConnection
     from websockets.http11 import Request, Response
 
-    from facegen.studio.wire import Element, Refused
+    from facegen.studio.gate import Element
+    from facegen.studio.wire import Refused
 
 log = logging.getLogger("facegen.studio")
 
@@ -36,6 +37,7 @@ PORTS = 100             # tried one after another where another port will do
 ID_BYTES = 24           # 192 bits: nobody guesses a work
 _REFUSED = 50           # messages of one page, after which it is sent away: none of viser's page is refused so often
 _TOLD = 5               # of them have a line of their own
+_LINES, _WHILE = 20, 10.0       # lines about refused requests in so many seconds
 _CLOSING = 1.0          # seconds for a page to say good-bye
 _AGAIN = 5.0            # seconds before a page is told the same once more
 
@@ -70,19 +72,20 @@ class StudioServer:
         if token is None and not guard.is_loopback(host):
             token = secrets.token_urlsafe(ID_BYTES)
         self.host, self.port, self.token, self.limits = host, port, token, limits or Limits()
-        self._asked = (port, 1 if exact else PORTS)
+        self._asked, self._names = (port, 1 if exact else PORTS), names(host)
         self._on_page, self._on_page_closed = on_page, on_page_closed
         self._viser: viser.ViserServer | None = None
         self._works: dict[int, str] = {}        # of each page, by the number that viser gives it
         self._seen: set[str] = set()
-        self._open: set[ServerConnection] = set()
+        self._open: dict[ServerConnection, str] = {}        # the works of the pages that are connected
+        self._refusals: list[float] = []        # when a line told of one
         self._last_told: dict[int, tuple[str, float]] = {}
         self._ready = False
 
     @property
     def url(self) -> str:
         """Where the studio is, with the token that lets in."""
-        return self.url_at(names(self.host)[0])
+        return self.url_at(self._names[0])
 
     def url_at(self, name: str) -> str:
         """Where the studio is under another name of this machine."""
@@ -105,7 +108,7 @@ class StudioServer:
         import_viser()
         from facegen.studio import seam
         from facegen.studio.connection import guarded
-        from facegen.studio.wire import Budget
+        from facegen.studio.gate import Budget
 
         self._seam, self.budget = seam, Budget(4 * self.limits.upload_bytes)
         self._page = front.Page(seam.page_file())
@@ -155,11 +158,10 @@ class StudioServer:
         work = guard.work_of(path)
         if refusal is None and work is None and (path != "/" or websocket):
             refusal = guard.Refusal(404, "there is nothing here; the studio begins at /")
-        if refusal is None and work is not None:
-            refusal = self._full(work)
+        if refusal is None and work is not None and (websocket or work not in self._open.values()):
+            refusal = self._full(work)      # a page that is loaded again is still connected
         if refusal is not None:
-            log.warning("refused %s %s: %s", "a websocket to" if websocket else "a request for", ascii(path[:80]),
-                        refusal.why)
+            self._tell_of_refusal(f"{'a websocket to' if websocket else 'a request for'} {path[:80]!a}", refusal)
             return front.sentence(refusal.status, refusal.why)
         if websocket:
             return None
@@ -175,7 +177,7 @@ class StudioServer:
         allowed = self.token is None or any(
             guard.is_token(given, self.token)
             for given in (guard.token_in_query(query), *guard.tokens_in_headers(every, self.port)))
-        refusal = (guard.check_host(every("Host"), names(self.host), self.port, addresses=self.host in EVERYWHERE)
+        refusal = (guard.check_host(every("Host"), self._names, self.port, addresses=self.host in EVERYWHERE)
                    or guard.check_origin(every, websocket=websocket, trusted=allowed and self.token is not None))
         if refusal is None and not allowed:
             refusal = guard.Refusal(403, "this studio wants its token: open the address that `facegen studio` printed, "
@@ -183,6 +185,15 @@ class StudioServer:
         if refusal is None and not self._ready:
             refusal = guard.Refusal(503, "the studio is starting or ending; try again")
         return refusal
+
+    def _tell_of_refusal(self, what: str, refusal: guard.Refusal) -> None:
+        """Log it, but not more lines than a person reads: another site's page can ask all day."""
+        now = time.monotonic()
+        self._refusals = [when for when in self._refusals if now - when < _WHILE]
+        if len(self._refusals) < _LINES:
+            self._refusals.append(now)
+            log.warning("refused %s: %s%s", what, refusal.why,
+                        "; others are not told of for a while" if len(self._refusals) == _LINES else "")
 
     def _full(self, work: str) -> guard.Refusal | None:
         if len(self._open) >= self.limits.pages:
@@ -205,13 +216,13 @@ class StudioServer:
             await connection.close(1013, "too many pages are open")
             return
         self._seen.add(work)
-        self._open.add(connection)
+        self._open[connection] = work
         try:
             await viser_handler(connection)
         except Exception as error:
             log.error("a page was lost: %s", _told(error))
         finally:
-            self._open.discard(connection)
+            self._open.pop(connection, None)
             connection.gate.close()
             if connection.close_code == 1009:
                 log.warning("a page was sent away: it sent more than %d bytes at once", self.limits.message_bytes)
@@ -228,6 +239,7 @@ class StudioServer:
             self._notify(client, "This file was not opened", refused.tell)
         if refused.closes or connection.refused >= _REFUSED:
             log.warning("a page was sent away: it sent what viser's page does not")
+            connection.away = True
             await connection.close(1008, "unexpected messages")
 
     def element(self, connection: ServerConnection, uuid: str) -> Element | None:

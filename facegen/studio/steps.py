@@ -8,6 +8,7 @@ from typing import Any
 from facegen.studio.history import History
 
 UNDO, REDO = "Undo", "Redo"
+_NOTHING = "Nothing done yet"
 
 _KEYS = ((UNDO, "Z", "cmd/ctrl"), (REDO, "Z", "cmd/ctrl+shift"), (REDO, "Y", "cmd/ctrl"))
 
@@ -27,6 +28,7 @@ button:has(.fg-thumb) .mantine-Button-section * { width: 100%; height: auto; mar
 button:has(.fg-thumb) .mantine-Button-label { display: block; font-size: 10px; line-height: 12px; height: 26px;
   padding: 1px 2px; color: #333; font-weight: 450; white-space: normal; overflow: hidden; text-align: center; }
 .fg-thumb { display: block; width: 100%; height: auto; aspect-ratio: 1; background: #ececec; }
+pre, pre code { white-space: pre-wrap; }
 button:has(.fg-on) { outline: 2px solid #b05c48; outline-offset: -1px; }
 </style>"""
 
@@ -38,7 +40,7 @@ class Steps:
         self._page = page
         gui = page.client.gui
         gui.add_html(_STYLE)
-        self._buttons = gui.add_button_group("", (UNDO, REDO), hint="Ctrl+Z and Ctrl+Shift+Z")
+        self._buttons = gui.add_button_group(_NOTHING, (UNDO, REDO), hint="Ctrl+Z and Ctrl+Shift+Z")
         self._buttons.on_click(page.calls(lambda: self._go(self._buttons.value)))
         for label, key, modifier in _KEYS:
             command = gui.add_command(label, hotkey=key, modifier=modifier)
@@ -49,6 +51,8 @@ class Steps:
 
     def refresh(self, history: History) -> None:
         """Show what can be taken back."""
-        self._buttons.hint = " · ".join(
-            text for text in (f"Ctrl+Z takes back: {history.undoes}" if history.undoes else "Nothing to take back",
-                              f"Ctrl+Shift+Z does again: {history.redoes}" if history.redoes else "") if text)
+        label = f"Last: {history.undoes}" if history.undoes else _NOTHING
+        self._buttons.label = label
+        again = f"; Ctrl+Shift+Z does {history.redoes} again" if history.redoes else ""
+        back = f"Ctrl+Z takes {history.undoes} back" if history.undoes else "Nothing to take back"
+        self._buttons.hint = back + again

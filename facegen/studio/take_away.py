@@ -9,10 +9,12 @@ from typing import Any
 import numpy as np
 from PIL import Image
 
-from facegen.facs.deformation import Deformation
+from facegen.errors import InputError
+from facegen.face.face import Face
 from facegen.facs.expressions import Resolution
+from facegen.facs.yamltext import yaml_text
 from facegen.studio.page import Page
-from facegen.studio.script_box import write_raw
+from facegen.studio.raw import whole_pose
 from facegen.studio.work import FaceWork, Work
 
 _SIZES = ("256", "512", "1024", "2048", "1920x1080")
@@ -31,13 +33,18 @@ def command(face: FaceWork, *, size: str = "512", raw: str = "face.yaml") -> str
     return shlex.join([*parts, "-o", "face.png"])
 
 
-def movements(face: FaceWork, meaning: Resolution) -> str:
-    """Return all that moves as the text of a deformation file: units, raw movements and gaze in one."""
-    from facegen.face.chain import whole
+def movements(face: FaceWork, meaning: Resolution, rig: Any) -> str:
+    """Return all that moves as the text of a deformation file: units, raw movements and gaze in one.
 
-    found: Deformation = whole(meaning)
-    about = f"# {face.script}" + (f" at intensity {face.intensity:g}" if face.intensity != 1.0 else "")
-    return f"{about}, made in the facegen studio\n{write_raw(found.as_dict())}\n"
+    InputError where nothing moves, and on an avatar where raw movements are in another unit of length.
+    """
+    every = meaning.deformation, *meaning.more
+    found = whole_pose(rig if isinstance(rig, Face) else None, *every, units=meaning.deformation.units)
+    if not found:
+        raise InputError("file: nothing moves yet, so there is nothing to save")
+    about = f"{face.script} on the face {face.rig}" + (f", as {face.person} does it" if face.person else "")
+    about += f", at intensity {face.intensity:g}" if face.intensity != 1.0 else ""
+    return yaml_text({"about": about, "source": "facegen studio", **found.as_dict()})
 
 
 def picture(rig: Any, meaning: Resolution, size: str, view: tuple[float, float] = (0.0, 0.0)) -> bytes:
@@ -79,7 +86,7 @@ class TakeAway:
         self._page.client.send_file_download("face.png", data, save_immediately=True)
 
     def _movements(self) -> None:
-        text = movements(self._page.work.face, self._page.meaning())
+        text = movements(self._page.work.face, self._page.meaning(), self._page.rig)
         self._page.client.send_file_download("face.yaml", text.encode(), save_immediately=True)
 
     def refresh(self, work: Work) -> None:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from functools import cached_property
+from typing import Self
 
 from facegen.facs.units import REGIONS, Unit, load_catalogue, split_code
 
@@ -21,6 +23,16 @@ class Row:
     hint: str
     whole: bool
     part: bool
+
+    @property
+    def number(self) -> str:
+        """The unit's number."""
+        return split_code(self.code)[1]
+
+    @cached_property
+    def atoms(self) -> tuple[str, ...]:
+        """What it moves."""
+        return tuple(load_catalogue().expand({self.code: 1.0}))
 
 
 def groups() -> Iterator[tuple[str, tuple[Row, ...]]]:
@@ -43,32 +55,36 @@ def _rows(unit: Unit) -> Iterator[Row]:
                   part=unit.sides != "direction")
 
 
-def uneven(units: Mapping[str, float]) -> frozenset[str]:
-    """Return the numbers of the units whose sides, or lips, differ."""
-    atoms, found = load_catalogue().expand(units), set()
-    for code in atoms:
-        unit = load_catalogue().unit(code)
-        if len({atoms.get(atom, 0.0) for atom in unit.atoms}) > 1:
-            found.add(unit.number)
-    return frozenset(found)
+@dataclass(frozen=True)
+class Stand:
+    """How the sliders stand: ``weights`` by atom; numbers of units whose sides or lips are ``uneven``; ``apart``."""
 
+    weights: Mapping[str, float]
+    uneven: frozenset[str]
+    apart: bool
 
-def shown(row: Row, units: Mapping[str, float], *, apart: bool) -> bool:
-    """Return whether a slider stands there: one for a pair, or two where it is apart or its sides differ."""
-    if not (row.whole or row.part):
-        return True
-    split = apart or split_code(row.code)[1] in uneven(units)
-    return row.part if split else row.whole
+    @classmethod
+    def of(cls, units: Mapping[str, float], *, apart: bool) -> Self:
+        """Return it for unit code -> weight."""
+        catalogue = load_catalogue()
+        atoms = catalogue.expand(units)
+        several = (catalogue.unit_of(code) for code in atoms)
+        uneven = (unit.number for unit in several if len({atoms.get(atom, 0.0) for atom in unit.atoms}) > 1)
+        return cls(atoms, frozenset(uneven), apart)
 
+    def shows(self, row: Row) -> bool:
+        """Return whether a slider stands there: one for a pair, or two where it is apart or its sides differ."""
+        if not (row.whole or row.part):
+            return True
+        return row.part if self.apart or row.number in self.uneven else row.whole
 
-def weight(row: Row, units: Mapping[str, float]) -> float:
-    """Return where a slider stands: of a pair that differs, the stronger."""
-    atoms = load_catalogue().expand(units)
-    return max(atoms.get(atom, 0.0) for atom in load_catalogue().expand({row.code: 1.0}))
+    def weight(self, row: Row) -> float:
+        """Return where a slider stands: of a pair that differs, at the stronger."""
+        return max(self.weights.get(atom, 0.0) for atom in row.atoms)
 
 
 def moved(row: Row, units: Mapping[str, float], value: float) -> dict[str, float]:
     """Return the units with a slider at another weight."""
     catalogue = load_catalogue()
-    atoms = catalogue.expand(units) | dict.fromkeys(catalogue.expand({row.code: 1.0}), float(value))
+    atoms = catalogue.expand(units) | dict.fromkeys(row.atoms, float(value))
     return catalogue.fold({atom: weight for atom, weight in atoms.items() if weight > 0.0})

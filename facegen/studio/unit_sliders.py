@@ -24,6 +24,8 @@ class UnitSliders:
                                             "has two in any case. Left is the subject's left.")
         self._apart.on_update(page.calls(self._split))
         self._sliders = {}
+        self._visible: dict[unit_rows.Row, bool] = {}
+        self._titles: dict[str, str] = {}
         self._folders = []
         for title, rows in unit_rows.groups():
             folder = gui.add_folder(title, expand_by_default=title in _OPEN)
@@ -33,7 +35,7 @@ class UnitSliders:
                     slider = gui.add_slider(row.label, 0.0, 1.0, 0.01, 0.0, hint=row.hint, marks=(),
                                             visible=not row.part)
                     slider.on_update(page.calls(partial(self._moved, row)))
-                    self._sliders[row] = slider
+                    self._sliders[row], self._visible[row] = slider, not row.part
 
     def _split(self) -> None:
         self._page.change("left and right apart" if self._apart.value else "left and right linked",
@@ -50,13 +52,13 @@ class UnitSliders:
             return
         self._shown = face
         self._apart.value = face.apart
+        stand = unit_rows.Stand.of(face.units, apart=face.apart)
         for row, slider in self._sliders.items():
-            slider.value = unit_rows.weight(row, face.units)
-            visible = unit_rows.shown(row, face.units, apart=face.apart)
-            if slider.visible != visible:
-                slider.visible = visible
+            slider.value = stand.weight(row)
+            if stand.shows(row) != self._visible[row]:          # viser takes its time to find that nothing changed
+                slider.visible = self._visible[row] = stand.shows(row)
         for folder, title, rows in self._folders:
-            acting = len({row.code.lstrip("LRTB") for row in rows if unit_rows.weight(row, face.units) > 0.0})
+            acting = len({row.number for row in rows if stand.weight(row) > 0.0})
             label = f"{title} · {acting}" if acting else title
-            if folder.label != label:
-                folder.label = label
+            if label != self._titles.get(title, title):
+                folder.label = self._titles[title] = label

@@ -16,9 +16,10 @@ from facegen.animation.streams.times import check_fps
 from facegen.errors import InputError, TableError
 from facegen.face.gaze import look_at
 from facegen.facs.deformation import Deformation, deformation_from_dict, weighted_sum
-from facegen.facs.expression_table import Person
+from facegen.facs.expression_table import HABITS, Person, person_from_data
 from facegen.facs.expressions import Resolution, resolve
 from facegen.facs.notation import canonical
+from facegen.facs.tables import load_units
 from facegen.facs.validate import Entry
 from facegen.studio.avatar_checks import check_avatar
 from facegen.studio.recordings import safe_name
@@ -70,10 +71,15 @@ class FaceWork:
         return deformation_from_dict(self.raw) if self.raw else Deformation()
 
     def meaning(self, person: Person | None = None, rig: Any = None) -> Resolution:
-        """Return what a rig is to show. person: who ``person`` is (`Desk.person`); their units move their way. rig: the
-        face, whose eyes look at the point that ``gaze`` says; without one they do not."""
+        """Return what a rig is to show.
+
+        person: who ``person`` is (`Desk.person`); their units move their way. rig: the face, whose eyes look at the
+        point that ``gaze`` says; without one they do not. Feature points that it has not are left out.
+        """
         found = resolve(dict(self.units) or "neutral", person=person, intensity=self.intensity)
         raw = self.deformation * self.intensity
+        if hasattr(rig, "possible"):            # moved on another face; the tab of points says so
+            raw = rig.possible(raw)
         if self.gaze and rig is not None:
             return _gazing(found, raw, self.gaze, rig)
         return replace(found, more=(*found.more, raw)) if raw else found
@@ -164,13 +170,23 @@ class AvatarWork:
 
 @dataclass(frozen=True)
 class TableWork:
-    """A person's table on its way to a file, as plain data (docs/tables.md)."""
+    """A person's table on its way to a file.
 
-    person: Mapping[str, Any] = field(default_factory=dict)
-    units: Mapping[str, Any] = field(default_factory=dict)
+    file: the name it is saved under among the work's people (`Desk.people`), or None while there is no person. data:
+    the table as plain data (docs/tables.md); one without habits yet is no error here.
+    """
+
+    file: str | None = None
+    data: Mapping[str, Any] = field(default_factory=dict)
+
+    @property
+    def person(self) -> Person | None:
+        """Whose habits these are; nobody while there are none."""
+        return person_from_data(self.data, self.file or "table") if any(map(self.data.get, HABITS)) else None
 
     def checked(self) -> Self:
         """Return itself, or raise InputError."""
+        load_units().own_basis(self.person)
         return self
 
 

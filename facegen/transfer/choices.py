@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass
 
 from facegen.errors import InputError, nearest
+from facegen.transfer.baselines import PaperWeights
 from facegen.transfer.skin import METHODS
 from facegen.transfer.weights import AnyWeights
 
@@ -35,6 +36,11 @@ class Choices:
                 raise InputError(f"{name}: the method '{self.method}' has none to choose; leave it out, or the method")
         _check_factor("opening", self.opening, _LEAST_OPENING, _MOST_OPENING)
         _check_factor("lid_closure", self.lid_closure, _LEAST_CLOSURE, _MOST_CLOSURE)
+
+    @property
+    def ours(self) -> bool:
+        """Whether the energy that is minimised is ours."""
+        return self.method == "landmarks" and not isinstance(self.weights, PaperWeights)
 
 
 def _check_factor(name: str, value: float, least: float, most: float) -> None:

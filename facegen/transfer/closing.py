@@ -11,7 +11,6 @@ where the template's have not parted.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -98,24 +97,25 @@ class _Wanted:
 @dataclass(frozen=True, eq=False)
 class Closing:
     """How one slit of an avatar is closed: built once, for the template's k shapes. ``margins`` and ``field`` are the
-    avatar's, ``rest`` (n, 3) and ``faces`` (m, 3) its skin, ``eye`` what its lids lie on."""
+    avatar's, ``rest`` (n, 3) its skin, ``gap`` (SAMPLES, 3) the slit then, mm; ``lid``: its lids, if they lie on an
+    eye."""
 
     margins: Margins
     field: Field
     rest: Array
-    faces: NDArray[np.int32]
-    eye: EyeFront | None
+    gap: Array
+    lid: _Lid | None
     wanted: _Wanted
 
-    @cached_property
-    def _gap(self) -> Array:
-        """The gap (SAMPLES, 3) at rest."""
-        return self.margins.gap(self.rest)
+    @property
+    def eye(self) -> EyeFront | None:
+        """What the lids lie on."""
+        return None if self.lid is None else self.lid.eye
 
     def of(self, shapes: NDArray[np.int64], lid_closure: float = 1.0) -> Closing:
         """Return how the slit closes in some of the shapes, if lids close so many times as far."""
         wanted = self.wanted.of(shapes)
-        return replace(self, wanted=wanted if lid_closure == 1.0 else wanted.closed_more(self._gap, lid_closure))
+        return replace(self, wanted=wanted if lid_closure == 1.0 else wanted.closed_more(self.gap, lid_closure))
 
     def narrows(self) -> NDArray[np.bool_]:
         """Return in which shapes (k,) lids close."""
@@ -127,7 +127,7 @@ class Closing:
 
     def close(self, motion: Array) -> None:
         """Add to the displacements (k, n, 3) of the skin what they miss, in place."""
-        wanted, gap = self.wanted, self._gap
+        wanted, gap = self.wanted, self.gap
         for k in np.flatnonzero(wanted.active.max(axis=1) > 0):
             missing = wanted.active[k, :, None] * (wanted.gap[k] - gap - self.margins.gap(motion[k]))
             still_open = np.linalg.norm(wanted.gap[k], axis=1)
@@ -140,7 +140,7 @@ class Closing:
                 continue
             share = wanted.upper_share[k]
             self._move(motion[k], self.field.steps(share * missing, (share - 1.0) * missing))
-            if self.eye is not None:
+            if self.lid is not None:
                 self._move(motion[k], counts.max() * self._to_edges(motion[k]))
 
     def _to_edges(self, motion: Array) -> Array:
@@ -160,56 +160,68 @@ class Closing:
         for k in np.flatnonzero(shut.any(axis=1)):
             upper, lower = self.margins.ends(self.rest + motion[k, rows])
             line = (upper + lower) / 2
-            if self.eye is not None:
-                centre = self.eye.ball.centre
+            if self.lid is not None:
+                centre = self.lid.eye.ball.centre
                 farther = np.maximum(*(np.linalg.norm(edge - centre, axis=1) for edge in (upper, lower)))
                 line = centre + farther[:, None] * _unit(line - centre)
             on = (shut[k] * _beyond(upper - lower - target[k]))[:, None]
             motion[k, rows[self.field.rows]] += self.field.steps(on * (line - upper), on * (line - lower))
 
-    @cached_property
-    def _at_rest(self) -> Array:
-        """The field's vertices (r, 3) in radii of the eye."""
-        return self.eye.ball.in_radii(self.rest[self.field.rows])
-
-    @cached_property
-    def _sunk(self) -> Array:
-        """How much nearer to the eye (r,) than clear of it the skin is at rest, in radii: it may stay as near; but
-        within the eye, only a lid's back, where nobody sees it."""
-        unit, home = _unit(self._at_rest), np.linalg.norm(self._at_rest, axis=1)
-        near = np.maximum(self._over(unit) - home, 0.0)
-        back = (vertex_normals(self.rest, self.faces)[self.field.rows] * self._at_rest).sum(axis=1) < 0
-        return np.where(back | (home > self.eye(unit)), near, 0.0)
-
     def _move(self, moved: Array, step: Array) -> None:
         """Move the skin of the field by (r, 3), in place: on an arc round the ball, and over what it covers."""
         rows = self.field.rows
-        if self.eye is None:
+        if self.lid is None:
             moved[rows] += step
             return
-        ball = self.eye.ball
-        now = ball.in_radii(self.rest[rows] + moved[rows])
-        then = now + step @ ball.inverse
-        home = np.linalg.norm(self._at_rest, axis=1)
-        lift = np.clip(np.linalg.norm(then - self._at_rest, axis=1) / _LIFTED, 0.0, 1.0)
-        wanted = np.where(home < _ON_THE_BALL, np.maximum(home, self._over(_unit(then)) - self._sunk), 0.0)
-        radius = np.linalg.norm(now, axis=1)
-        radius = radius + _beyond(step) * lift * np.maximum(wanted - radius, 0.0)
-        changed = (step != 0).any(axis=1) & (then != 0).any(axis=1)
-        place = (radius[:, None] * _unit(then)) @ ball.shape + ball.centre
-        moved[rows] = np.where(changed[:, None], place - self.rest[rows], moved[rows])
+        changed, places = self.lid.moved(self.rest[rows] + moved[rows], step)
+        moved[rows[changed]] = places - self.rest[rows[changed]]
 
-    def _over(self, unit: Array) -> Array:
-        """Return the radius (r,) at which triangles with corners in the directions (r, 3) clear the eye."""
-        edges = self.field.edges
-        side = ((unit[edges[:, 0]] - unit[edges[:, 1]]) ** 2).sum(axis=1)
-        ends, both = edges.ravel(), np.repeat(side, 2)
+
+class _Lid:
+    """The skin of a field round an eye, in the eye's radii; what no shape changes is computed once."""
+
+    def __init__(self, eye: EyeFront, edges: NDArray, rest: Array, outward: Array) -> None:
+        """edges (e, 2): of the skin rest (r, 3), mm, whose normals are outward (r, 3)."""
+        self.eye, self._rest = eye, eye.ball.in_radii(rest)
+        self._home = np.linalg.norm(self._rest, axis=1)
+        self._edges, ends = edges, edges.ravel()
+        self._by_end = np.argsort(ends, kind="stable")
+        self._with_edges, self._starts = np.unique(ends[self._by_end], return_index=True)
+        self._count = np.maximum(np.bincount(ends, minlength=len(rest)), 1)
+        # How much nearer to the eye than clear of it the skin is at rest: it may stay as near; but within the eye, only
+        # a lid's back, where nobody sees it.
+        unit, everywhere = _unit(self._rest), np.arange(len(rest))
+        near = np.maximum(self._over(unit, everywhere) - self._home, 0.0)
+        back = (outward * self._rest).sum(axis=1) < 0
+        self._sunk = np.where(back | (self._home > eye(unit)), near, 0.0)
+
+    def moved(self, at: Array, step: Array) -> tuple[NDArray[np.int64], Array]:
+        """Return which of the skin's places at (r, 3), mm, a step (r, 3) moves, and where to (s, 3)."""
+        ball = self.eye.ball
+        now = ball.in_radii(at)
+        then = now + step @ ball.inverse
+        changed = np.flatnonzero((step != 0).any(axis=1) & (then != 0).any(axis=1))
+        unit = _unit(then)
+        lift = np.clip(np.linalg.norm((then - self._rest)[changed], axis=1) / _LIFTED, 0.0, 1.0)
+        wanted = np.zeros(len(changed))
+        on = self._home[changed] < _ON_THE_BALL
+        rows = changed[on]
+        wanted[on] = np.maximum(self._home[rows], self._over(unit, rows) - self._sunk[rows])
+        radius = np.linalg.norm(now[changed], axis=1)
+        radius = radius + _beyond(step[changed]) * lift * np.maximum(wanted - radius, 0.0)
+        return changed, (radius[:, None] * unit[changed]) @ ball.shape + ball.centre
+
+    def _over(self, unit: Array, rows: NDArray) -> Array:
+        """Return the radius (s,) at which triangles with corners in the directions (r, 3) clear the eye, at some of
+        the corners (s,)."""
+        side = ((unit[self._edges[:, 0]] - unit[self._edges[:, 1]]) ** 2).sum(axis=1)
+        both = np.repeat(side, 2)
         longest = np.zeros(len(unit))
-        np.maximum.at(longest, ends, both)
-        mean = np.bincount(ends, both, len(unit)) / np.maximum(np.bincount(ends, minlength=len(unit)), 1)
+        longest[self._with_edges] = np.maximum.reduceat(both[self._by_end], self._starts)
+        mean = np.bincount(self._edges.ravel(), both, len(unit)) / self._count
         coarse = smooth_step((np.sqrt(longest) - _FINE) / (_COARSE - _FINE))
         square = mean + coarse * (longest - mean)
-        return (self.eye(unit) + _OUT) / np.sqrt(1 - np.minimum(square / 3, _MOST_SAG))
+        return (self.eye(unit[rows]) + _OUT) / np.sqrt(1 - np.minimum(square[rows] / 3, _MOST_SAG))
 
 
 def closing(skin: Skin, slit: Slit, eye: EyeFront | None = None) -> Closing | None:
@@ -225,7 +237,11 @@ def closing(skin: Skin, slit: Slit, eye: EyeFront | None = None) -> Closing | No
     told = _told_lips if slit is LIPS else _told_lids
     upper, lower = (np.stack([edge @ one for one in template.motion]) for edge in (own.upper, own.lower))
     wanted = told(own.gap(template.surface.vertices), upper, lower, margins.gap(rest), skin.parts.matrices[slit.name])
-    return Closing(margins, closing_field(skin, own, margins), rest, skin.surface.faces, eye, wanted)
+    field, lid = closing_field(skin, own, margins), None
+    if eye is not None:
+        normals = vertex_normals(rest, skin.surface.faces)
+        lid = _Lid(eye, field.edges, rest[field.rows], normals[field.rows])
+    return Closing(margins, field, rest, margins.gap(rest), lid, wanted)
 
 
 def _told_lips(gap: Array, upper: Array, lower: Array, own_gap: Array, part: Array) -> _Wanted:

@@ -1,7 +1,8 @@
 """What can be wrong with landmarks on a mesh, found from the places alone and said in words.
 
 Every rule has to let a horse and a cat pass, so the rules are about order, sides and mirrors more than about
-distances; the average face only tells what is no face at all.
+distances; the average face only tells what is no face at all. While places are still being set only some are there:
+each rule then asks what can be asked of those.
 """
 
 from __future__ import annotations
@@ -29,6 +30,8 @@ _ODD_MIRROR, _WRONG_MIRROR = 0.35, 0.6
 _ODD_MIDDLE, _WRONG_MIDDLE = 0.2, 0.5
 # How far from the average face's place, in its millimetres, and how many times the usual misfit of this face.
 _FAR, _FAR_TIMES = 45.0, 5.0
+# So many places tell whether they form a face at all: fewer fit a face however they lie.
+_TELLING = 12
 # Below this the two diagonals of an eye say nothing about which way it is turned.
 _CLEAR = 0.2
 
@@ -43,7 +46,8 @@ def average_face() -> dict[str, Array]:
 
 
 def place_faults(names: Sequence[str], corners: NDArray, weights: Array, mesh: Mesh) -> tuple[list[str], list[str]]:
-    """Return (errors, warnings) about landmarks on a mesh. Rules that build on others stop where those fail."""
+    """Return (errors, warnings) about landmarks on a mesh, all of a face's or some. Rules that build on others stop
+    where those fail."""
     vertices = mesh.vertices
     p = dict(zip(names, np.einsum("kc,kci->ki", weights, vertices[corners]), strict=True))
     errors, warnings = coincidences(p, corners, weights, mesh)
@@ -77,7 +81,7 @@ def _unexplained(p: dict[str, Array], mirror: float) -> float:
     from facegen.face.landmarks import REQUIRED
 
     names = [name for name in p if name in REQUIRED]
-    if len(names) < 4:
+    if len(names) < _TELLING:
         return 0.0
     x = np.array([p[name] for name in names])
     y = np.array([average_face()[name] for name in names]) * [mirror, 1.0, 1.0]
@@ -103,24 +107,38 @@ class _Frame:
         return np.array([self.x, self.y, self.z]) @ (place - self.middle) / self.unit
 
 
+_EYE = ("eye_inner", "eye_outer", "eye_upper", "eye_lower")
+
+
 def _pairs(p: dict[str, Array]) -> list[str]:
     return [name[:-2] for name in p if name.endswith("_L") and f"{name[:-2]}_R" in p]
 
 
-def _frame(p: dict[str, Array]) -> _Frame:
-    """Return the axes that most pairs agree on: a swapped one changes nothing."""
+def _frame(p: dict[str, Array]) -> _Frame | None:
+    """Return the axes that most pairs agree on: a swapped one changes nothing. None where too few places are known."""
     pairs = [name for name in _pairs(p) if name.startswith(("eye", "brow", "nose", "mouth"))]
+    eyes = [name for name in pairs if name in _EYE] or [name for name in pairs if name.startswith(("eye", "brow"))]
+    below = _below(p)
+    if not eyes or below is None:
+        return None
     across = np.array([p[f"{name}_L"] - p[f"{name}_R"] for name in pairs])
     x = np.linalg.svd(across, full_matrices=False)[2][0]
     x = x if np.sign(across @ x).sum() > 0 or (np.sign(across @ x).sum() == 0 and (across @ x).sum() > 0) else -x
     middle = np.median([(p[f"{name}_L"] + p[f"{name}_R"]) / 2 for name in pairs], axis=0)
-    eyes = [_eye(p, s) for s in "LR"]
-    lips = (p["mouth_top"] + p["mouth_bottom"] + p["mouth_corner_L"] + p["mouth_corner_R"]) / 4
-    y = (eyes[0] + eyes[1]) / 2 - lips
+    left, right = (np.mean([p[f"{name}_{s}"] for name in eyes], axis=0) for s in "LR")
+    y = (left + right) / 2 - below
     y = y - x * (x @ y)
-    unit = float(np.linalg.norm(eyes[0] - eyes[1]))
+    unit = float(np.linalg.norm(left - right))
     y = y / max(np.linalg.norm(y), 1e-300)
     return _Frame(x, y, np.cross(x, y), middle, max(unit, 1e-300))
+
+
+def _below(p: dict[str, Array]) -> Array | None:
+    """Return a place in the middle below the eyes: of the lips, or what else is known."""
+    lips = [name for name in ("mouth_top", "mouth_bottom") if name in p]
+    lips += ["mouth_corner_L", "mouth_corner_R"] if "mouth_corner" in _pairs(p) else []
+    lips = lips or [name for name in ("mouth_inner_top", "mouth_inner_bottom", "chin", "nose_tip") if name in p][:1]
+    return np.mean([p[name] for name in lips], axis=0) if lips else None
 
 
 def _eye(p: dict[str, Array], s: str) -> Array:
@@ -130,13 +148,16 @@ def _eye(p: dict[str, Array], s: str) -> Array:
 def _sides(p: dict[str, Array], mesh: Mesh) -> tuple[list[str], list[str]]:
     """Left and right: pairs against the others, and the whole set against the way the face looks."""
     frame = _frame(p)
+    if frame is None:
+        return [], []
     against = [name for name in _pairs(p) if (p[f"{name}_L"] - p[f"{name}_R"]) @ frame.x < 0]
     if against:
         listed = ", ".join(f"'{name}_L' and '{name}_R'" for name in against)
         return [f"{listed} are swapped: _L is the subject's own left, on the right of a picture of the face"], []
     # Three witnesses of which way is out: the nose, the skin's normals, and where the head's bulk is.
-    rim = [p[name] for s in "LR" for name in (f"eye_outer_{s}", f"mouth_corner_{s}")]
-    nose = float(frame.at(p["nose_tip"])[2] - np.mean([frame.at(one)[2] for one in rim]))
+    rim = [p[name] for s in "LR" for name in (f"eye_outer_{s}", f"mouth_corner_{s}") if name in p]
+    nose = float(frame.at(p["nose_tip"])[2] - np.mean([frame.at(one)[2] for one in rim])) \
+        if rim and "nose_tip" in p and _below(p) is not p["nose_tip"] else 0.0
     core = np.array([place for name, place in p.items() if name.startswith(("eye", "brow", "nose", "mouth", "chin"))])
     centre, reach = core.mean(axis=0), 1.5 * np.linalg.norm(np.ptp(core, axis=0))
     used = mesh.vertices[np.unique(mesh.faces)]
@@ -164,7 +185,8 @@ def _normals_at(places: Array, mesh: Mesh) -> Array:
 def _order(p: dict[str, Array], mesh: Mesh) -> tuple[list[str], list[str]]:
     frame = _frame(p)
     errors, warnings = [], []
-    for s in "LR":
+    whole = [s for s in "LR" if all(f"{name}_{s}" in p for name in _EYE)]
+    for s in whole if frame is not None else ():
         errors += _eye_order(p, s, frame)
     more_errors, more_warnings = _mouth_order(p)
     return errors + more_errors, warnings + more_warnings
@@ -174,7 +196,9 @@ def _eye_order(p: dict[str, Array], s: str, frame: _Frame) -> list[str]:
     """Corners, lids and brow of one eye. From outside, inner -> outer -> upper runs one way round in each eye."""
     inner, outer, upper, lower = (p[f"eye_{name}_{s}"] for name in ("inner", "outer", "upper", "lower"))
     side = 1.0 if s == "L" else -1.0
-    outward = _eye(p, s) - (_eye(p, "L") + _eye(p, "R")) / 2 + frame.unit * frame.z
+    both = all(f"{name}_{one}" in p for name in _EYE for one in "LR")
+    between = (_eye(p, "L") + _eye(p, "R")) / 2 if both else frame.middle
+    outward = _eye(p, s) - between + frame.unit * frame.z
     turn = side * np.cross(outer - inner, upper - lower)
     size = np.linalg.norm(outer - inner) * np.linalg.norm(upper - lower) * np.linalg.norm(outward)
     turned = float(turn @ outward) / size if size > 0 else 0.0
@@ -192,19 +216,25 @@ def _eye_order(p: dict[str, Array], s: str, frame: _Frame) -> list[str]:
     up = up if np.linalg.norm(up) > 0.02 * width else np.cross(outward, (outer - inner) * side)
     up = up - (outer - inner) * (up @ (outer - inner)) / width**2
     up = up / max(np.linalg.norm(up), 1e-300)
-    heights = {name: float((p[f"brow_{name}_{s}"] - _eye(p, s)) @ up) / width for name in ("inner", "mid", "outer")}
-    if heights["mid"] < 0 or min(heights.values()) < -0.75:
+    heights = {name: float((p[f"brow_{name}_{s}"] - _eye(p, s)) @ up) / width for name in ("inner", "mid", "outer")
+               if f"brow_{name}_{s}" in p}
+    if heights and (heights.get("mid", 0.0) < 0 or min(heights.values()) < -0.75):
         low = min(heights, key=heights.get)
         errors.append(f"'brow_{low}_{s}' lies below 'eye_upper_{s}'; brows lie above the eye, on the side of its upper "
                       "lid")
-    if side * float((p[f"brow_outer_{s}"] - p[f"brow_inner_{s}"]) @ frame.x) < -0.3 * width:
+    ends = {"inner", "outer"} <= heights.keys()
+    along = float((p[f"brow_outer_{s}"] - p[f"brow_inner_{s}"]) @ frame.x) if ends else 0.0
+    if side * along < -0.3 * width:
         errors.append(f"'brow_inner_{s}' and 'brow_outer_{s}' are swapped: the inner end is the one beside the nose")
     return errors
 
 
 def _mouth_order(p: dict[str, Array]) -> tuple[list[str], list[str]]:
     """Nose, upper lip, lower lip and chin, in this order along the way from nose to chin."""
-    lips = (p["mouth_top"] + p["mouth_bottom"] + p["mouth_corner_L"] + p["mouth_corner_R"]) / 4
+    known = [name for name in ("mouth_top", "mouth_bottom", "mouth_corner_L", "mouth_corner_R") if name in p]
+    if not known or "nose_tip" not in p or "chin" not in p:
+        return [], []
+    lips = np.mean([p[name] for name in known], axis=0)
     nose, chin = p["nose_tip"] - lips, p["chin"] - lips
     length = max(float(np.linalg.norm(p["nose_tip"] - p["chin"])), 1e-300)
     if float(nose @ chin) > 0.6 * np.linalg.norm(nose) * np.linalg.norm(chin):
@@ -212,11 +242,16 @@ def _mouth_order(p: dict[str, Array]) -> tuple[list[str], list[str]]:
     down = (p["chin"] - p["nose_tip"]) / length
     order = ("mouth_top", "mouth_inner_top", "mouth_inner_bottom", "mouth_bottom")
     others = tuple(f"{name}_{s}" for name in ("nose_wing", "mouth_corner") for s in "LR")
-    along = {name: float((p[name] - p["nose_tip"]) @ down) / length for name in (*order, *others)}
+    along = {name: float((p[name] - p["nose_tip"]) @ down) / length for name in (*order, *others) if name in p}
+    order = tuple(name for name in order if name in p)
     errors, warnings = [], []
-    if along["mouth_top"] > along["mouth_bottom"]:
+
+    def under(high: str, low: str, by: float = 0.0) -> bool:
+        return high in along and low in along and along[high] > along[low] + by
+
+    if under("mouth_top", "mouth_bottom"):
         errors.append("'mouth_top' lies under 'mouth_bottom'; swap them: top is the upper lip's outer edge")
-    elif along["mouth_inner_top"] > along["mouth_inner_bottom"] + 0.02:
+    elif under("mouth_inner_top", "mouth_inner_bottom", 0.02):
         errors.append("'mouth_inner_top' lies under 'mouth_inner_bottom'; swap them")
     else:
         for above, below in pairwise(order):
@@ -224,12 +259,12 @@ def _mouth_order(p: dict[str, Array]) -> tuple[list[str], list[str]]:
                 errors.append(f"'{above}' lies below '{below}'")
             elif along[above] > along[below] + 0.05:
                 warnings.append(f"'{above}' lies below '{below}'; is that meant?")
-    if along["mouth_bottom"] > 1.1:
+    if along.get("mouth_bottom", 0.0) > 1.1:
         errors.append("'chin' lies above 'mouth_bottom'; the chin is below the lower lip")
-    if np.linalg.norm(nose) > 1.1 * np.linalg.norm(p["nose_bridge"] - lips):
+    if "nose_bridge" in p and np.linalg.norm(nose) > 1.1 * np.linalg.norm(p["nose_bridge"] - lips):
         errors.append("'nose_tip' lies farther from the mouth than 'nose_bridge'; swap them")
     errors += [f"'nose_wing_{s}' lies below 'mouth_corner_{s}'" for s in "LR"
-               if along[f"nose_wing_{s}"] > along[f"mouth_corner_{s}"] + 0.1]
+               if under(f"nose_wing_{s}", f"mouth_corner_{s}", 0.1)]
     return errors, warnings
 
 
@@ -238,8 +273,13 @@ def _positions(p: dict[str, Array]) -> tuple[list[str], list[str]]:
     errors, warnings = [], []
     frame = _frame(p)
     average = average_face()
-    found = align(p, average)
-    misfit = {name: float(np.linalg.norm(found.apply(p[name]) - average[name])) for name in p if name in average}
+    if frame is None or len(p.keys() & set(average)) < _TELLING:
+        misfit = {}
+    else:
+        found = align(p, average)
+        misfit = {name: float(np.linalg.norm(found.apply(p[name]) - average[name])) for name in p if name in average}
+    if frame is None:
+        return errors, warnings
     usual = float(np.median(list(misfit.values()))) if misfit else 0.0
     for name in _pairs(p):
         left, right = frame.at(p[f"{name}_L"]), frame.at(p[f"{name}_R"])

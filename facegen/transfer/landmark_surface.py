@@ -92,7 +92,10 @@ def touching(p: dict[str, Array], corners: NDArray, weights: Array, mesh: Mesh) 
         high, low = sorted(pair, key=lambda name: "top" not in name and "upper" not in name)
         if what == "lip" or not pair <= row.keys() or np.linalg.norm(p[high] - p[low]) > _TOUCHES * extent:
             continue
-        up = p["mouth_top"] - p["mouth_bottom"] if what == "mouth" else p[f"brow_mid_{low[-1]}"] - p[low]
+        above, below = ("mouth_top", "mouth_bottom") if what == "mouth" else (f"brow_mid_{low[-1]}", low)
+        if above not in p or below not in p:
+            continue
+        up = p[above] - p[below]
         around = []
         for name in (high, low):
             own = corners[row[name]][weights[row[name]] > 1e-6]

@@ -68,31 +68,38 @@ def snap(points: Mapping[str, NDArray], mesh: Mesh) -> Landmarks:
     return _snap({name: Landmark(at=tuple(np.asarray(at, float))) for name, at in points.items()}, mesh)
 
 
-def load_landmarks(path: Path | str, mesh: Mesh, *, mesh_name: str = "", digest: str = "") -> Landmarks:
+def load_landmarks(path: Path | str, mesh: Mesh, *, mesh_name: str = "", digest: str = "", partial: bool = False
+                   ) -> Landmarks:
     """Return the landmarks in a file, on a mesh, after every check.
 
     mesh_name, digest: the mesh's file name and content hash (SHA-256, hexadecimal), compared if the file names one.
+    partial: required ones may be missing.
     What is merely suspicious is told by `check_places`. Raises FileError (not to be read) or TableError: unknown,
     missing or doubled names, places the mesh does not have, left and right swapped, a place on the wrong part, or a
     file for another mesh.
     """
-    about, entries = landmark_entries(path)
+    return load_checked(path, mesh, mesh_name=mesh_name, digest=digest, partial=partial)[0]
+
+
+def load_checked(path: Path | str, mesh: Mesh, *, mesh_name: str = "", digest: str = "", partial: bool = False
+                 ) -> tuple[Landmarks, list[str]]:
+    """Return what `load_landmarks` does, and what `check_places` has to warn of."""
+    about, entries = landmark_entries(path, partial=partial)
     if about is not None:
         _check_mesh(about, mesh, mesh_name, digest)
     found = {name: read_landmark(entry, len(mesh.vertices), mesh.faces, mesh.parts) for name, entry in entries.items()}
     try:
         landmarks = _snap(found, mesh)
-        check_places(landmarks, mesh)
+        return landmarks, check_places(landmarks, mesh, partial=partial)
     except InputError as error:
         raise TableError(f"{path}: {error}") from None
-    return landmarks
 
 
-def check_places(landmarks: Landmarks, mesh: Mesh) -> list[str]:
+def check_places(landmarks: Landmarks, mesh: Mesh, *, partial: bool = False) -> list[str]:
     """Return warnings, a sentence each, about landmarks that may be wrong; InputError for those that must be,
-    and for required ones that are missing."""
+    and, unless ``partial``, for required ones that are missing."""
     missing = [f"'{name}'" for name in REQUIRED if name not in landmarks.names]
-    if missing:
+    if missing and not partial:
         raise InputError(f"landmarks: {_listed(missing)} missing")
     check_faces(landmarks.names, landmarks.corners, landmarks.barycentric, mesh)
     errors, warnings = place_faults(landmarks.names, landmarks.corners, landmarks.barycentric, mesh)

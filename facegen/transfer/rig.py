@@ -18,7 +18,7 @@ from facegen.fileio.kept import kept_in
 from facegen.progress import Progress, silent, within
 from facegen.transfer.choices import Choices
 from facegen.transfer.halfway import half_name
-from facegen.transfer.landmarks import check_places, load_landmarks
+from facegen.transfer.landmarks import Landmarks, check_places, load_checked
 from facegen.transfer.pieces import describe
 from facegen.transfer.template import Template, template_of
 from facegen.transfer.template_file import read_template
@@ -56,20 +56,42 @@ def avatar_names() -> tuple[str, ...]:
     return tuple(_shipped())
 
 
-def avatar_files(avatar: str | Path, landmarks: str | Path | None, *, what: str = "avatar") -> tuple[Path, Path]:
-    """Return the file of an avatar, given by path or a shipped one by name, and that of its landmarks. ``what`` it is
-    called in errors. Raises InputError or FileError."""
+def avatar_path(avatar: str | Path, *, what: str = "avatar") -> Path:
+    """Return the file of an avatar, given by path or a shipped one by name. ``what`` it is called in errors. Raises
+    FileError."""
     path = _shipped().get(str(avatar), Path(avatar))
     if not path.exists():
         named = f", or one of {', '.join(_shipped())}" if path.suffix == "" else ""
         raise FileError(f"{what}: expected a file{named}, got {str(avatar)!r}, which does not exist"
                         f"{nearest(str(avatar), _shipped())}")
+    return path
+
+
+def avatar_files(avatar: str | Path, landmarks: str | Path | None, *, what: str = "avatar") -> tuple[Path, Path]:
+    """Return the file of an avatar, given by path or a shipped one by name, and that of its landmarks. ``what`` it is
+    called in errors. Raises InputError or FileError."""
+    path = avatar_path(avatar, what=what)
     marks = Path(landmarks) if landmarks is not None else path.with_name("landmarks.yaml") \
         if str(avatar) in _shipped() else None
     if marks is None:
-        raise InputError(f"landmarks: expected the file of the {what}'s landmarks, got none; write one with the places "
-                         f"of eyes, brows, nose, mouth and chin on {path.name} (docs/landmarks.md lists the names)")
+        raise InputError(f"landmarks: expected the file of the {what}'s landmarks, got none; 'facegen "
+                         f"landmarks {path.name} -o {path.stem}.yaml' proposes them, to be looked at "
+                         "(docs/landmarks.md lists the names)")
     return path, marks
+
+
+def _read(avatar: str | Path | AvatarFile, landmarks: str | Path | Landmarks | None
+          ) -> tuple[AvatarFile, Landmarks, list[str]]:
+    """Return an avatar and its landmarks, read and checked, and what is odd about these."""
+    if isinstance(avatar, AvatarFile) and landmarks is not None:
+        source, marks = avatar, landmarks
+    else:
+        file = avatar.path if isinstance(avatar, AvatarFile) else avatar
+        path, marks = avatar_files(file, "" if isinstance(landmarks, Landmarks) else landmarks)
+        source = load_avatar(path)
+    if isinstance(landmarks, Landmarks):
+        return source, landmarks, check_places(landmarks, source.mesh)
+    return source, *load_checked(marks, source.mesh, mesh_name=source.path.name, digest=source.digest)
 
 
 class Rigging:
@@ -81,18 +103,21 @@ class Rigging:
         rigging.save("cat.glb", opening=1.2)
     """
 
-    def __init__(self, avatar: str | Path, *, landmarks: str | Path | None = None, sets: Sequence[str] | None = None,
-                 shapes: Sequence[str] | None = None, person: str | Path | None = None,
-                 template: str | Path | None = None, template_landmarks: str | Path | None = None,
-                 pieces: Mapping[str, str] | None = None, cache: bool = True) -> None:
-        """Read and check everything; the work is done when it is asked for. All as in `rig`."""
-        path, marks = avatar_files(avatar, landmarks)
+    def __init__(self, avatar: str | Path | AvatarFile, *, landmarks: str | Path | Landmarks | None = None,
+                 sets: Sequence[str] | None = None, shapes: Sequence[str] | None = None,
+                 person: str | Path | None = None, template: str | Path | None = None,
+                 template_landmarks: str | Path | None = None, pieces: Mapping[str, str] | None = None,
+                 cache: bool = True) -> None:
+        """Read and check everything; the work is done when it is asked for.
+
+        avatar, landmarks: as in `rig`, or what `load_avatar` and `snap` gave. Everything else as in `rig`.
+        """
         self._asked = asked = _asked(sets, shapes, person, template, template_landmarks)
-        self.source = load_avatar(path)
-        self.places = load_landmarks(marks, self.source.mesh, mesh_name=path.name, digest=self.source.digest)
-        self.warnings = (*check_places(self.places, self.source.mesh), *_without_expressions(self.source, asked.sets))
+        self.source, self.places, odd = _read(avatar, landmarks)
+        self.warnings = (*odd, *_without_expressions(self.source, asked.sets))
         self._pieces, self._cache = pieces, cache
         self._binding: Binding | None = None
+        self._once = False
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -113,6 +138,8 @@ class Rigging:
         sets, source = self._asked.sets, self.source
         check_output(source, output, sets)
         found = self._shapes(None, choices, within(progress, 0.0, 0.9))
+        if self._once:
+            self._binding = None        # at 100,000 triangles 200 MiB, which writing can use
         made = {name: found.shapes[name] for name in sets}
         made |= {half_name(name): moved for name, moved in found.halves.items()}
         expressions = {name: {name: 1.0} for name, kind in sets.items() if kind == "vrm"}
@@ -162,6 +189,7 @@ def rig(avatar: str | Path, output: str | Path, *, landmarks: str | Path | None 
     progress("reading the avatar", 0.0)
     rigging = Rigging(avatar, landmarks=landmarks, sets=sets, shapes=shapes, person=person, template=template,
                       template_landmarks=template_landmarks, pieces=pieces, cache=cache)
+    rigging._once = True
     return rigging.save(output, method=method, weights=weights, opening=opening, lid_closure=lid_closure,
                         normals=normals, quantise=quantise, progress=within(progress, 0.05, 1.0))
 

@@ -43,8 +43,8 @@ _FINE_ENOUGH = 60_000
 
 @dataclass(frozen=True, eq=False)
 class Solver:
-    """``system``: factored. ``motion`` (k, n_s, 3): the template's, without its jaw. ``n``: of the avatar's vertices,
-    of which the system may have more."""
+    """``motion`` (k, n_s, 3): the template's, without its jaw. ``n``: of the avatar's vertices, of which the ``system``
+    may have more."""
 
     system: Transfer
     motion: NDArray[np.float64]
@@ -78,7 +78,7 @@ class Skin:
         return self.correspondence(self.registered, vertex_normals(self.registered, self.surface.faces), self.sides,
                                    reach=_REACH)
 
-    @property
+    @cached_property
     def copied(self) -> bool:
         """Whether the skin is the template's own, vertex for vertex within rounding: it then moves as that does."""
         feet = self.feet
@@ -108,7 +108,7 @@ class Skin:
                progress: Progress = silent) -> NDArray[np.float64]:
         """Return the displacements (k, n, 3) of the template's shapes on this skin, mm."""
         if method == "landmarks" and not isinstance(weights, PaperWeights):
-            result = self.solver(weights or OURS)(np.arange(len(self.template.names)), progress=progress)
+            result = self.solver(self.system(weights or OURS))(np.arange(len(self.template.names)), progress=progress)
             self.open_jaw(result, self.template.jaw)
             return result
         return self.published_motion(method, weights)
@@ -157,8 +157,12 @@ class Skin:
         return (placing(self.places, names, len(self.surface.vertices)),
                 landmark_matrix(self.template.places, names, matrices, len(self.template.surface.vertices)))
 
-    def solver(self, weights: Weights = OURS) -> Solver:
-        """Return the factored system, on a finer copy of the skin where the template bends more than it can."""
+    def solver(self, system: Transfer) -> Solver:
+        """Return what solves a `system` for the template's shapes."""
+        return Solver(system, self.without_jaw, len(self.surface.vertices))
+
+    def system(self, weights: Weights = OURS) -> Transfer:
+        """Return the system, on a finer copy of the skin where the template bends more than it can."""
         template, surface, registered = self.template, self.surface, self.registered
         sides, feet = self.sides, self.feet
         places, matrix = self._landmark_motion(blended=True)
@@ -172,8 +176,7 @@ class Skin:
         middles = self.correspondence(shape.corners.mean(axis=1), shape.normals, sides[surface.faces].mean(axis=1),
                                       reach=_REACH)
         matrices, turns = spread(self.parts, template.landmarks, registered)
-        system = Transfer(surface, template.surface, feet, middles, matrices, turns, places, matrix, weights, sides)
-        return Solver(system, self.without_jaw, len(self.surface.vertices))
+        return Transfer(surface, template.surface, feet, middles, matrices, turns, places, matrix, weights, sides)
 
     def _bend(self, motion: NDArray, places: NDArray, sides: NDArray) -> NDArray[np.float64]:
         """Return how far the motion of the middles of sides (e, 2) between places is from the mean of their ends', at

@@ -16,11 +16,11 @@ from numpy.typing import NDArray
 
 from facegen.errors import InputError, nearest
 from facegen.fileio.kept import Kept
+from facegen.forked import Aside, for_each, shared_zeros
 from facegen.geometry.mesh import Mesh
-from facegen.progress import Progress, counted, silent, within
+from facegen.progress import Progress, silent, within
 from facegen.transfer.alignment import Similarity, align
 from facegen.transfer.apart import take_apart
-from facegen.transfer.baselines import PaperWeights
 from facegen.transfer.choices import OURS_CHOICES, Choices
 from facegen.transfer.landmarks import Landmarks
 from facegen.transfer.pieces import Piece
@@ -28,12 +28,12 @@ from facegen.transfer.pushing import Contact
 from facegen.transfer.skin import Skin, Solver, lay_skin
 from facegen.transfer.solve import OURS, Weights
 from facegen.transfer.template import Template
-from facegen.transfer.whole import Moved, WholeMotion, among_all
+from facegen.transfer.whole import Beside, WholeMotion, among_all
 
 # Because squares of larger numbers, and float32 in files, run over.
 _FARTHEST = 1e30
 # Shapes that are made together, to bound the memory.
-_AT_A_TIME = 16
+_AT_A_TIME = 8
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,18 +78,22 @@ class _Remembered:
     @classmethod
     def of(cls, k: int, n: int) -> _Remembered:
         """Return nothing, with room for k shapes of n vertices."""
-        return cls(np.zeros((k, n, 3)), [None] * k)
+        return cls(shared_zeros((k, n, 3)), [None] * k)
 
-    def put(self, shapes: NDArray[np.int64], moved: Moved, how: Sequence[Choices]) -> None:
-        """Remember some shapes (s,)."""
-        self.motion[shapes] = moved.motion
-        for name, contact in moved.contacts.items():
+    def forget(self, shapes: Sequence[int]) -> None:
+        """Let go of some shapes, before their motion is overwritten."""
+        for k in shapes:
+            self.how[k] = None
+
+    def put(self, shapes: NDArray[np.int64], beside: Beside, how: Sequence[Choices]) -> None:
+        """Remember of some shapes (s,) whose motion is there already what is beside it."""
+        for name, contact in beside.contacts.items():
             all_of = self.contacts.setdefault(name, Contact(*np.zeros((2, len(self.how)))))
             all_of.before[shapes], all_of.after[shapes] = contact.before, contact.after
         for k, own in zip(shapes.tolist(), how, strict=True):
             self.how[k] = own
             self.halves.pop(k, None)
-        self.halves.update(moved.halves)
+        self.halves.update(beside.halves)
 
 
 class Binding:
@@ -129,6 +133,7 @@ class Binding:
                 raise InputError(f"only: no shape is called '{name}'{nearest(str(name), template.names)}")
         wanted = [k for k, name in enumerate(template.names) if only is None or name in only]
         progress("finding lids, lips and eyes", 0.0)
+        self._prepare(choices)
         how = self._choices_by_shape(choices)
         made = self._made or _Remembered.of(len(template.names), len(self._parts.vertices))
         self._made = made
@@ -136,10 +141,16 @@ class Binding:
         fresh = [k for k in sorted(needed) if made.how[k] != how[k]]
         blocks = [np.array(fresh[start:start + _AT_A_TIME]) for start in range(0, len(fresh), _AT_A_TIME)]
         if blocks:
-            progress("solving for the skin's motion", 0.1)
             skin_motion = self._skin_motion(choices)
-            for block in counted(within(progress, 0.2, 1.0), "carrying the shapes over", blocks):
-                made.put(block, self._moved(block, skin_motion(block), choices), [how[k] for k in block])
+            made.forget(fresh)
+
+            def work(i: int) -> Beside:
+                made.motion[blocks[i]], beside = self._moved(blocks[i], skin_motion(blocks[i]), choices)
+                return beside
+
+            done = for_each(len(blocks), work, progress=within(progress, 0.2, 1.0), stage="carrying the shapes over")
+            for block, beside in zip(blocks, done, strict=True):
+                made.put(block, beside, [how[k] for k in block])
         back, own = self.frame.inverse(), self._parts.own
 
         def returned(motion: NDArray) -> NDArray[np.float64]:
@@ -162,15 +173,22 @@ class Binding:
         return [replace(choices, opening=choices.opening if jaw else 1.0,
                         lid_closure=choices.lid_closure if lid else 1.0) for jaw, lid in both]
 
+    def _prepare(self, choices: Choices) -> None:
+        """Make what no shape changes, in two processes if both halves of it are missing."""
+        weights = choices.weights or OURS
+        if not choices.ours or (self._solver is not None and self._solver[0] == weights):
+            return
+        self._solver = None                         # two are never needed
+        _ = self.skin.feet, self.skin.without_jaw   # which both halves need
+        with Aside(lambda: self.skin.system(weights), useful="_whole" not in vars(self)) as system:
+            _ = self._whole
+            self._solver = weights, self.skin.solver(system.result())
+
     def _skin_motion(self, choices: Choices) -> Callable[[NDArray], NDArray]:
         """Return what gives the skin's displacements (s, n, 3) in some shapes (s,)."""
-        weights = choices.weights or OURS
-        if choices.method != "landmarks" or isinstance(weights, PaperWeights):
+        if not choices.ours:
             return self.skin.published_motion(choices.method, choices.weights).__getitem__
-        if self._solver is None or self._solver[0] != weights:
-            self._solver = None                     # two are never needed
-            self._solver = weights, self.skin.solver(weights)
-        solver = self._solver[1]
+        _, solver = self._solver
 
         def motion(shapes: NDArray[np.int64]) -> NDArray[np.float64]:
             result = solver(shapes)
@@ -179,9 +197,9 @@ class Binding:
 
         return motion
 
-    def _moved(self, shapes: NDArray[np.int64], on_skin: NDArray, choices: Choices) -> Moved:
+    def _moved(self, shapes: NDArray[np.int64], on_skin: NDArray, choices: Choices) -> tuple[NDArray, Beside]:
         if choices.method == "landmarks":
             return self._whole(shapes, on_skin, opening=choices.opening, lid_closure=choices.lid_closure)
         motion = among_all(on_skin, self._parts.rows, len(self._parts.vertices))
         self._parts.skin.carry(motion)
-        return Moved(motion, {}, {})
+        return motion, Beside({}, {})

@@ -23,11 +23,10 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
-class Moved:
-    """``motion`` (s, n, 3) of all vertices in some shapes, mm. ``contacts``: see `Guard`. ``halves``: shape ->
-    corrective (n, 3), see `halfway`."""
+class Beside:
+    """What is known of shapes beside their motion. ``contacts``: see `Guard`. ``halves``: shape -> corrective (n, 3),
+    see `halfway`."""
 
-    motion: Array
     contacts: Mapping[str, Contact]
     halves: Mapping[int, Array]
 
@@ -55,9 +54,9 @@ class WholeMotion:
         """Which shapes (k,) depend on how far lids close."""
 
     def __call__(self, shapes: NDArray[np.int64], on_skin: Array, *, opening: float = 1.0,
-                 lid_closure: float = 1.0) -> Moved:
-        """Return how the avatar moves in some shapes (s,) of the template. on_skin (s, n, 3): its skin does, mm;
-        overwritten."""
+                 lid_closure: float = 1.0) -> tuple[Array, Beside]:
+        """Return the displacements (s, n, 3) of all vertices in some shapes (s,) of the template, mm, and what is known
+        beside them. on_skin (s, n, 3): the skin's; overwritten."""
         skin, template, pieces = self._skin, self._skin.template, self._pieces
         jaw, gaze = template.jaw[shapes], template.gaze[shapes]
         # A copy closes as the template does: there is nothing to mend.
@@ -81,7 +80,7 @@ class WholeMotion:
                                                                   self._closing[shapes])
         self._hanging.carry(motion)
         self._hanging.carry(halves.values())
-        return Moved(motion, contacts, {int(shapes[k]): one for k, one in halves.items()})
+        return motion, Beside(contacts, {int(shapes[k]): one for k, one in halves.items()})
 
 
 def among_all(on_skin: Array, rows: NDArray, n: int) -> Array:

@@ -1,6 +1,8 @@
 """A person's own units: read strictly, and honoured wherever a person is given."""
 
 import json
+import re
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,6 +14,7 @@ from facegen.errors import InputError, TableError
 from facegen.facs.expression_table import load_person, person_from_data
 from facegen.facs.expressions import resolve
 from facegen.facs.tables import load_units
+from facegen.facs.yamlfile import parse_yaml
 
 HEAD = {"about": "Somebody.", "source": "invented"}
 CORNER = {"points": {"mouth_corner_L": [0.1, 0.3, 0.0]}}
@@ -175,6 +178,14 @@ def test_a_batch_draws_the_person_and_knows_when_the_person_changed(tmp_path):
         task.make()
         pictures[name] = (tmp_path / task.file).read_bytes()
     assert pictures["half"] != pictures["full"]
+
+
+def test_the_table_of_the_docs_is_one():
+    text = (Path(__file__).parents[2] / "docs" / "tables.md").read_text()
+    person = person_from_data(parse_yaml(re.search(r"```yaml\n(name: Ada.*?)```", text, re.S)[1], "tables.md"))
+    assert resolve("grin", person=person).expression is person.expressions["happiness"]
+    assert resolve("R12E", person=person).deformation == person.units["R12"].deformation
+    assert resolve("4", person=person).deformation == resolve("4").deformation * 0.5
 
 
 def test_explain_and_people_tell(tmp_path):

@@ -16,6 +16,12 @@ class Handle:
         self.kind, self.removed, self._calls = kind, False, []
         self.__dict__.update(values)
 
+    def __setattr__(self, name: str, value: Any) -> None:
+        """As viser does, refuse to change what was removed."""
+        if self.__dict__.get("removed"):
+            raise RuntimeError(f"cannot assign to '{name}' on a removed handle")
+        self.__dict__[name] = value
+
     def on_update(self, call):
         self._calls.append(call)
         return call
@@ -43,6 +49,8 @@ class Handle:
 
     def remove(self):
         self.removed = True
+
+    close = remove
 
 
 class Maker:
@@ -84,6 +92,7 @@ class Maker:
             named["content"] = values[0]
         elif len(values) > 1:
             named.setdefault("initial_value", values[1])
+        named.setdefault("visible", True)
         if "initial_value" in named:
             named["value"] = named.pop("initial_value")
         made = Handle(kind, **named)

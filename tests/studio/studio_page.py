@@ -19,6 +19,8 @@ SIZE = {"width": 900, "height": 600}
 SECONDS = 60.0          # long: a shared machine, and pixels drawn without a GPU
 # viser's sorter of Gaussian splats, of which the studio shows none, compiles text, and our policy lets no page do that.
 _NO_SPLATS = "Evaluating a string as JavaScript violates"
+# Said by viser's page whenever an object is dragged; nothing comes of it.
+_PASSIVE = "Unable to preventDefault inside passive event listener invocation."
 # A busy machine may draw less than a frame a second: frames are counted, not only time.
 _FRAMES = """() => new Promise(done => {
     let left = 4
@@ -40,7 +42,8 @@ class StudioPage:
         self.errors: list[str] = []
         origin = re.match(r"https?://[^/]+", url)[0]
         page.set_default_timeout(SECONDS * 1000)
-        page.on("console", lambda said: self.errors.append(f"console: {said.text}") if said.type == "error" else None)
+        page.on("console", lambda said: self.errors.append(f"console: {said.text}")
+                if said.type == "error" and said.text != _PASSIVE else None)
         page.on("pageerror", lambda error: None if _NO_SPLATS in str(error) else self.errors.append(f"page: {error}"))
         page.on("requestfailed", lambda request: self.errors.append(f"failed: {request.url[:200]}"))
         page.on("request", lambda request: None if request.url.startswith((origin, f"blob:{origin}", "data:"))
@@ -110,7 +113,7 @@ class StudioPage:
     def row(self, label: str):
         """The line of the panel that a label begins: slider, number, text, choice, check box."""
         named = self.page.locator("label", has_text=re.compile(rf"^{re.escape(label)}$")).locator("visible=true")
-        return named.first.locator("xpath=ancestor::div[.//input][1]")
+        return named.first.locator("xpath=ancestor::div[.//input or .//textarea][1]")
 
     def input(self, label: str):
         """The box of a labelled line in which one types."""

@@ -14,6 +14,7 @@ from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import connect
 
 PROTOCOL = "viser-v1.1.1"
+PATIENCE = 40.0         # seconds that an answer is waited for: the machine may be busy
 CAMERA = {"type": "ViewerCameraMessage", "wxyz": [1.0, 0.0, 0.0, 0.0], "position": [0.0, 0.0, 3.0], "fov": 0.8,
           "near": 0.01, "far": 1000.0, "image_height": 600, "image_width": 800, "look_at": [0.0, 0.0, 0.0],
           "up_direction": [0.0, 1.0, 0.0]}
@@ -56,7 +57,7 @@ class RawPage:
         """Send anything."""
         self.socket.send(data)
 
-    def receive(self, seconds: float = 10.0) -> list[dict[str, Any]]:
+    def receive(self, seconds: float = PATIENCE) -> list[dict[str, Any]]:
         """Return the next batch of messages from the server, an empty list when none comes."""
         try:
             raw = self.socket.recv(timeout=seconds)
@@ -66,7 +67,7 @@ class RawPage:
         return msgspec.msgpack.decode(zstandard.ZstdDecompressor().decompress(
             raw[16:16 + size], max_output_size=int.from_bytes(raw[:8], "little")))["messages"]
 
-    def until(self, kind: str, seconds: float = 10.0, **fields: Any) -> dict[str, Any]:
+    def until(self, kind: str, seconds: float = PATIENCE, **fields: Any) -> dict[str, Any]:
         """Return the first message of a kind from the server whose fields are as told."""
         end = time.monotonic() + seconds
         while (left := end - time.monotonic()) > 0:
@@ -75,7 +76,7 @@ class RawPage:
                     return message
         raise AssertionError(f"no {kind} came within {seconds:.0f} s")
 
-    def elements(self, count: int, seconds: float = 10.0) -> dict[str, str]:
+    def elements(self, count: int, seconds: float = PATIENCE) -> dict[str, str]:
         """Return the uuid of each of so many elements of the panel by its label."""
         end, found = time.monotonic() + seconds, {}
         while len(found) < count and (left := end - time.monotonic()) > 0:
@@ -95,7 +96,7 @@ class RawPage:
         self.send(CAMERA)
         return self
 
-    def closed(self, seconds: float = 10.0) -> int | None:
+    def closed(self, seconds: float = PATIENCE) -> int | None:
         """Return the code with which the server closes the connection, None if it stays open."""
         end = time.monotonic() + seconds
         try:

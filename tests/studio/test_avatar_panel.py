@@ -216,6 +216,13 @@ def test_points_that_are_wrong_are_said_in_words(opened):
     said = opened.panel.picker._faults
     assert said.visible
     assert "**Inner corner, left eye** and **Outer corner, left eye** are swapped" in said.content
+    opened.gui.find("Make blendshapes").press()
+    assert wait(lambda: opened.client.notices)
+    assert wait(lambda: opened.panel.rigging.task is None)
+    (title, text), = opened.client.notices
+    assert title == "That cannot be"
+    assert text.startswith("Landmarks: **Inner corner, left eye** and")
+    assert not opened.gui.find("Make blendshapes").disabled
     opened.page.undo()
     assert opened.panel.picker.settle()
     assert "swapped" not in said.content
@@ -256,9 +263,14 @@ def test_an_upload_is_kept_with_the_work_and_found_after_a_reload(tmp_path):
     assert wait(lambda: first.work.file)
     assert first.work.file == "my_cat.obj"
     first.gui.find("Open an avatar").enter(Upload("bad.glb", b"glTF"))
-    assert wait(lambda: first.client.notices)
-    assert first.client.notices[0][0] == "That cannot be"
+    assert wait(lambda: [title for title, _ in first.client.notices if title == "That cannot be"])
     assert first.work.file == "my_cat.obj"
+    assert ("Colours are missing", "They are in cat.mtl: open that file too.") in first.client.notices
+    plain = first.panel.scene.figure
+    colours = avatar_files("cat", None)[0].with_suffix(".mtl").read_bytes()
+    first.gui.find("Open an avatar").enter(Upload("cat.mtl", colours))
+    assert first.panel.scene.opened.avatar.colours
+    assert first.panel.scene.figure is not plain, "it is painted"
     first.page.close()
     again = Opened(tmp_path, avatar=None)
     assert again.work.file == "my_cat.obj"
@@ -276,6 +288,23 @@ def test_an_avatar_that_lies_down_is_stood_up(opened):
     opened.gui.find("It looks to").enter("+y")
     assert "at right angles" in opened.client.notices[-1][1]
     assert opened.gui.find("It looks to").value == "-z", "what is shown is what is"
+
+
+def test_what_cannot_be_chosen_is_shown_as_it_was(opened):
+    for label in ("Expressions of all kinds", "ARKit's 52", "Visemes"):
+        opened.gui.find(label).enter(False)
+    assert opened.work.sets == "visemes"
+    assert "one or more" in opened.client.notices[-1][1]
+    assert opened.gui.find("Visemes").value
+    opened.gui.find("Landmarks").enter(40.0)
+    assert opened.work.weights == {"landmarks": 40.0}
+    opened.gui.find("Back to ours").press()
+    assert (opened.work.weights, opened.gui.find("Landmarks").value) == ({}, 20.0)
+    opened.gui.find("Mouth opens").enter(1.3)
+    opened.gui.find("Lids close").enter(0.4)
+    assert (opened.work.opening, opened.work.lid_closure) == (1.3, 0.4)
+    opened.page.undo()
+    assert (opened.gui.find("Lids close").value, opened.work.opening) == (1.0, 1.3)
 
 
 class Upload:

@@ -4,12 +4,16 @@ from __future__ import annotations
 
 import numpy as np
 
+from facegen.studio.limits import Limits
 
-def _ball(client, work):
-    """A page with a ball that grows."""
+
+def _ball(client, work, rays=None):
+    """A page with a ball that grows, and tells of clicks."""
     client.scene.set_up_direction("+y")
     ball = client.scene.add_icosphere("/ball", radius=1.0, color=(200, 30, 30))
     slider = client.gui.add_slider("size", 0.2, 2.0, 0.01, 1.0)
+    if rays is not None:
+        ball.on_click(lambda event: rays.append((event.ray_origin, event.ray_direction)))
 
     @slider.on_update
     def _(event):
@@ -20,8 +24,9 @@ def _red(picture: np.ndarray) -> int:
     return int(((picture[..., 0] > 120) & (picture[..., 1] < 120)).sum())
 
 
-def test_a_slider_moves_the_picture(serve, browser_page):
-    server = serve(_ball)
+def test_a_slider_moves_the_picture_and_a_click_finds_what_is_there(serve, browser_page):
+    rays = []
+    server = serve(lambda client, work: _ball(client, work, rays))
     page = browser_page(server)
     assert page.page.title() == "facegen studio"
     page.until(lambda: _red(page.pixels()) > 500)
@@ -31,6 +36,17 @@ def test_a_slider_moves_the_picture(serve, browser_page):
     assert page.value("size") == 2.0
     assert _red(after) > 2.5 * _red(before)
     assert server.pages[0][1] == page.work
+    rows, columns = np.nonzero((after[..., 0] > 120) & (after[..., 1] < 120))
+    middle = float(np.median(columns)), float(np.median(rows))
+    page.click(middle)
+    page.until(lambda: rays)
+    origin, direction = np.array(rays[0])
+    away = np.linalg.norm(np.cross(direction, -origin)) / np.linalg.norm(direction)
+    assert away < 0.3                                   # of the ball's middle, whose radius is 2
+    page.click((middle[0] + 0.47 * np.ptp(columns), middle[1]))
+    page.until(lambda: len(rays) > 1)
+    origin, direction = np.array(rays[1])
+    assert 1.5 < np.linalg.norm(np.cross(direction, -origin)) / np.linalg.norm(direction) < 2.0
 
 
 def test_a_page_that_is_loaded_again_has_the_same_work(serve, browser_page):
@@ -47,7 +63,7 @@ def test_a_page_that_is_loaded_again_has_the_same_work(serve, browser_page):
     page.until(lambda: [work for _, work in server.gone] == [first])
 
 
-def test_files_go_up_and_come_down(serve, browser_page, tmp_path):
+def test_files_go_up_and_come_down_and_what_is_refused_is_told_of(serve, browser_page, tmp_path):
     came = []
 
     def build(client, work):
@@ -56,28 +72,15 @@ def test_files_go_up_and_come_down(serve, browser_page, tmp_path):
         client.gui.add_button("Take away").on_click(
             lambda _: client.send_file_download("face.txt", b"R12A", save_immediately=True))
 
-    page = browser_page(serve(build))
-    sent = tmp_path / "big.bin"
+    page = browser_page(serve(build, limits=Limits(file_bytes=4_000_000)))
+    sent, large = tmp_path / "big.bin", tmp_path / "large.glb"
     sent.write_bytes(np.random.default_rng(1).bytes(3_000_000))
-    page.upload("Open avatar", sent)
+    large.write_bytes(bytes(5_000_000))
+    page.upload("Open avatar", large)
+    page.says("large.glb has 4.8 MiB; the studio opens such files up to 3.8 MiB.")
+    assert not came
+    page.upload("Open avatar", sent)                    # the button is not left waiting for the other
     page.until(lambda: came)
     assert came == [("big.bin", sent.read_bytes())]
     got = page.download(tmp_path, lambda: page.press("Take away"))
     assert (got.name, got.read_bytes()) == ("face.txt", b"R12A")
-
-
-def test_clicks_on_the_canvas_find_what_stands_there(serve, browser_page):
-    rays = []
-
-    def build(client, work):
-        client.scene.set_up_direction("+y")
-        ball = client.scene.add_icosphere("/ball", radius=1.0, color=(200, 30, 30))
-        ball.on_click(lambda event: rays.append(event.ray_origin))
-
-    page = browser_page(serve(build))
-    page.until(lambda: _red(page.pixels()) > 500)
-    picture = page.still()
-    rows, columns = np.nonzero((picture[..., 0] > 120) & (picture[..., 1] < 120))
-    page.click((float(np.median(columns)), float(np.median(rows))))
-    page.until(lambda: rays)
-    assert np.isfinite(rays[0]).all()

@@ -14,6 +14,8 @@ import pytest
 
 from facegen.face.face import load_face
 from facegen.studio.avatar_panel import AvatarPanel
+from facegen.studio.figure import SCALE
+from facegen.studio.landmark_words import partner
 from facegen.studio.picking import as_places, point
 from facegen.transfer.landmarks import load_landmarks
 from facegen.transfer.rig import avatar_files
@@ -46,34 +48,28 @@ def pixel(browser, page, place):
 
 def test_landmarks_are_placed_by_clicking_on_pixels(opened, shots):
     browser, page, panel = opened
-    browser.choose("Or try one", "human")
+    browser.choose("Or try one", "cartoon")
     browser.until(lambda: panel.scene.figure is not None)
     scene, picker = panel.scene, panel.picker
-    true = load_landmarks(avatar_files("human", None)[1], scene.mesh).points(scene.mesh.vertices)
-
-    def seen(name):
-        """Where the point is on the canvas, once the picture has turned to it."""
-        assert picker.settle()
-        browser.still()
-        return pixel(browser, page, scene.figure.place(scene.placement.apply(true[name])))
-
-    for _ in range(2):
+    true = load_landmarks(avatar_files("cartoon", None)[1], scene.mesh).points(scene.mesh.vertices)
+    for count in (1, 2):
         name = picker.wanted(page.work.avatar)
-        browser.click(seen(name))
-        browser.until(lambda: picker.wanted(page.work.avatar) != name)      # noqa: B023
+        browser.still()                                     # the picture has turned to it
+        browser.click(pixel(browser, page, scene.figure.place(scene.placement.apply(true[name]))))
+        browser.until(lambda: len(page.work.avatar.landmarks) == count)     # noqa: B023
         at = point(scene.mesh, page.work.avatar.landmarks[name])
         off = np.linalg.norm(scene.placement.apply(at) - scene.placement.apply(true[name]))
         assert off < 2.0, f"{name} was placed {off:.1f} mm beside the pixel's place"
-    browser.until(lambda: len(picker.proposals.places) > 20, 60)
+        browser.until(lambda: partner(name) in picker.markers.marks)        # noqa: B023
+        away = picker.markers.marks[partner(name)].at - scene.figure.place(scene.placement.apply(true[partner(name)]))
+        assert np.linalg.norm(away) / SCALE < 3.0, "its partner is proposed on the other side"
     placed = page.work.avatar.landmarks
-    guessed = {name: scene.placement.apply(point(scene.mesh, one)) for name, one in picker.proposals.places.items()}
-    away = [np.linalg.norm(at - scene.placement.apply(true[name])) for name, at in guessed.items() if name in true]
-    assert np.median(away) < 8.0
-    browser.still()
+    browser.until(lambda: picker.proposals.advised)         # the face was looked for meanwhile
     browser.page.screenshot(path=shots / "avatar-landmarks.png")
-    browser.press(f"Take all proposals ({len(picker._open_proposals(page.work.avatar))})")
-    browser.until(lambda: len(page.work.avatar.landmarks) > 20)
+    browser.press(picker._all.label)
+    browser.until(lambda: len(page.work.avatar.landmarks) > len(placed))
     assert placed.items() <= page.work.avatar.landmarks.items()
+    assert {partner(name) for name in placed} <= set(page.work.avatar.landmarks)
     browser.press("Undo")
     browser.until(lambda: page.work.avatar.landmarks == placed)
 
@@ -86,7 +82,8 @@ def test_an_avatar_is_opened_rigged_and_taken_away(opened, tmp_path, shots):
     browser.upload("Open an avatar", bad)
     browser.says("That cannot be")
     browser.upload("Open an avatar", source)
-    browser.until(lambda: page.work.avatar.file == "my_cartoon.obj")
+    browser.until(lambda: panel.scene.figure is not None)
+    assert page.work.avatar.file == "my_cartoon.obj"
     marks = load_landmarks(avatar_files("cartoon", None)[1], panel.scene.mesh)
     page.change("landmarks", avatar=replace(page.work.avatar, landmarks=as_places(marks), sets="units"))
     browser.press("Make blendshapes")

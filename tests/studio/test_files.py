@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+import shutil
+import time
 from pathlib import Path
 
 import pytest
@@ -109,3 +111,49 @@ def test_no_text_leads_out(name):
     except (InputError, FileError):
         return
     assert found.is_relative_to(root)
+
+
+def test_a_page_opens_an_avatar_from_a_folder(tmp_path):
+    """From the panel to the work, by the process that reads strangers' files; a name that is none is told of."""
+    from fake_client import FakeClient
+
+    from facegen.studio.avatar_panel import AvatarPanel
+    from facegen.studio.desk import Desk
+    from facegen.studio.page import Page
+    from facegen.transfer.rig import avatar_files
+
+    (tmp_path / "heads").mkdir()
+    shutil.copy(avatar_files("cat", None)[0], tmp_path / "heads" / "tom.obj")
+    (tmp_path / "heads" / "broken.glb").write_bytes(b"glTF")
+    page = Page(FakeClient(), "work-of-one", Desk(tmp_path / "works", Shelf([tmp_path / "heads"])),
+                {"Avatar": AvatarPanel})
+    choice = page.client.gui.find("Or from a folder")
+    assert choice.visible
+    choice.enter("heads/tom.obj")
+    _until(lambda: page.work.avatar.file == "tom.obj")
+    _until(lambda: choice.value == "-")
+    for name in ("heads/broken.glb", "heads/../../secret.obj"):
+        before = len(page.client.notices)
+        choice.enter(name)
+        _until(lambda before=before: len(page.client.notices) > before)
+    assert page.work.avatar.file == "tom.obj"
+    page.close()
+
+
+def test_without_folders_there_is_nothing_to_choose(tmp_path):
+    from fake_client import FakeClient
+
+    from facegen.studio.avatar_panel import AvatarPanel
+    from facegen.studio.desk import Desk
+    from facegen.studio.page import Page
+
+    page = Page(FakeClient(), "work-of-one", Desk(tmp_path), {"Avatar": AvatarPanel})
+    assert not page.client.gui.find("Or from a folder").visible
+    page.close()
+
+
+def _until(true, seconds=30.0):
+    end = time.monotonic() + seconds
+    while not true():
+        assert time.monotonic() < end
+        time.sleep(0.02)

@@ -9,11 +9,11 @@ import time
 
 import msgspec
 import pytest
-from studio_raw import CAMERA
+from studio_raw import CAMERA, PATIENCE
 
 from facegen.errors import InputError
+from facegen.studio.gate import PART
 from facegen.studio.limits import Limits
-from facegen.studio.wire import PART
 
 
 @pytest.fixture
@@ -49,7 +49,7 @@ def _update(uuid, **updates):
 def _settled(page, uuids, events, value=0.5):
     """Wait until the server has heard all that was sent before: it answers an honest update."""
     page.send(_update(uuids["smile"], value=value))
-    end = time.monotonic() + 10
+    end = time.monotonic() + PATIENCE
     while ("smile", value) not in events:
         assert time.monotonic() < end, events
         time.sleep(0.02)
@@ -140,11 +140,14 @@ def test_nobody_shares_the_studio(studio_server, caplog):
     assert studio_server.viser._share_tunnel is None
 
 
-def test_who_goes_on_and_on_is_sent_away(panel):
+def test_who_goes_on_and_on_is_sent_away(panel, caplog):
     server, page, _, _, _ = panel()
-    page.send(*[{"type": "ShareUrlRequest"}] * 60)
-    assert page.closed() == 1008
-    end = time.monotonic() + 10
+    with caplog.at_level(logging.WARNING, "facegen.studio"):
+        page.send(*[{"type": "ShareUrlRequest"}] * 90)
+        assert page.closed() == 1008
+    assert sum("sent away" in record.getMessage() for record in caplog.records) == 1
+    assert sum("refused a message" in record.getMessage() for record in caplog.records) == 5
+    end = time.monotonic() + PATIENCE
     while not server.gone and time.monotonic() < end:
         time.sleep(0.02)
     assert server.gone
@@ -189,6 +192,18 @@ def test_a_file_over_the_limit_is_refused_before_it_comes(panel):
     assert server.budget.taken == 0
 
 
+@pytest.mark.parametrize(("name", "size", "told"), [
+    ("a.exe", 10, "expected a file that ends in .glb, .yaml"), ("a.glb.exe", 10, "expected a file"),
+    ("glb", 10, "expected a file"), ("a.yaml", 2**20, "up to 0.5 MiB"), ("a.YAML", 2**20, "up to 0.5 MiB"),
+    ("a.glb", 2**30, "up to 64.0 MiB")])
+def test_a_file_of_another_kind_or_size_is_told_of(serve, raw, name, size, told):
+    server = serve(lambda client, work: client.gui.add_upload_button("open", mime_type=".glb,.yaml"))
+    page = raw(server).begin()
+    page.send(_start(page.element("open"), size, filename=name))
+    assert told in page.until("NotificationShowMessage")["props"]["body"]
+    assert not server.pages[0][0].gui._current_file_upload_states
+
+
 @pytest.mark.parametrize("lie", ["parts", "many parts", "long part", "short part", "twice", "index", "elsewhere"])
 def test_sizes_that_lie_end_the_page(panel, lie):
     server, page, uuids, handles, events = panel()
@@ -201,12 +216,48 @@ def test_sizes_that_lie_end_the_page(panel, lie):
                 "elsewhere": [_start(here, 10), _part(uuids["smile"], 0, b"x" * 10)]}
     page.send(*messages[lie])
     assert page.closed() == 1008
-    end = time.monotonic() + 10
+    end = time.monotonic() + PATIENCE
     while (not server.gone or server.budget.taken) and time.monotonic() < end:
         time.sleep(0.02)
     assert server.budget.taken == 0
     assert not events
     assert handles["smile"].value == 0.0
+
+
+def test_hostile_files_are_told_of_and_the_studio_goes_on(studio, raw):
+    """Sent to the whole studio, as a page sends them: its panels read them, and the next good file opens."""
+    import json
+    import struct
+
+    from facegen.studio.avatar_panel import AvatarPanel
+
+    text = json.dumps({"asset": {"version": "2.0"}, "scenes": [{"nodes": [0]}], "nodes": [{"mesh": 0}],
+                       "meshes": [{"primitives": [{"attributes": {"POSITION": 0}}]}],
+                       "accessors": [{"count": 2**31, "componentType": 5126, "type": "VEC3"}]}).encode()
+    text += b" " * (-len(text) % 4)
+    bomb = struct.pack("<4sIIII", b"glTF", 2, 20 + len(text), len(text), 0x4E4F534A) + text
+    escape = (b'{"asset": {"version": "2.0"}, "buffers": [{"byteLength": 9, "uri": "../../../../../../etc/passwd"}]}')
+    running = studio(panels={"Avatar": AvatarPanel})
+    page = raw(running.server).begin()
+    opens = page.elements(3, seconds=2 * PATIENCE)
+    while "Load landmarks" not in opens:
+        opens |= page.elements(1)
+    for number, (button, name, content, told) in enumerate([
+            ("Open an avatar", "bomb.glb", bomb, "triangles"), ("Open an avatar", "a.gltf", escape, "leads out"),
+            ("Open an avatar", "../../../../etc/cron.d/a.glb", b"glTF", "glb"),
+            ("Load landmarks", "a.yaml", b"!!python/object/apply:os.system ['true']", "")]):
+        page.send(_start(opens[button], len(content), f"t{number}", filename=name),
+                  _part(opens[button], 0, content, f"t{number}"))
+        found = page.until("NotificationShowMessage")["props"]
+        assert told in found["body"], found
+        assert "root:" not in found["body"]
+    good = b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"
+    page.send(_start(opens["Open an avatar"], len(good), "good", filename="good.obj"),
+              _part(opens["Open an avatar"], 0, good, "good"))
+    end = time.monotonic() + PATIENCE
+    while not any(one.work.avatar.file == "good.obj" for one in running.pages.values()):
+        assert time.monotonic() < end
+        time.sleep(0.05)
 
 
 def test_uploads_at_once_are_few(panel):
@@ -251,7 +302,7 @@ def test_a_flood_from_one_page_leaves_the_other_responsive(serve, raw):
             begin = time.monotonic()
             calm.send(_update(here, value=i / 10 + 0.05))
             while len(heard) <= i:
-                assert time.monotonic() - begin < 10, "the calm page was not heard"
+                assert time.monotonic() - begin < PATIENCE, "the calm page was not heard"
                 time.sleep(0.002)
     finally:
         stop.set()
@@ -282,7 +333,7 @@ def test_handlers_of_a_page_run_in_turn_and_the_newest_value_wins(serve, raw):
     uuids = page.elements(2)
     page.send(*[_update(uuids["smile"], value=i / 50) for i in range(1, 31)], _update(uuids["key"], value=True),
               _update(uuids["key"], value=True), *[_update(uuids["smile"], value=0.8 + i / 100) for i in range(10)])
-    end = time.monotonic() + 10
+    end = time.monotonic() + PATIENCE
     while [label for label, _ in heard].count("key") < 2 or heard[-1] != ("smile", 0.89):
         assert time.monotonic() < end, heard
         time.sleep(0.02)

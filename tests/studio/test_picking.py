@@ -157,6 +157,8 @@ def test_messages_say_the_words_of_the_studio():
     said = picking.words_for("'eye_upper_L' lies below 'eye_lower_L'; swap them")
     assert said == "**Upper lid, left eye** lies below **Lower lid, left eye**; swap them"
     assert picking.words_for("'eye_upper_inner_L' is odd").startswith("**Upper lid, inner half, left**")
+    assert picking.words_for("set 2 more, best nose_tip, jaw_L; the chin too") == (
+        "Set 2 more, best **Tip of the nose**, **Joint of the jaw, left**; the chin too")
 
 
 @pytest.mark.parametrize(("change", "said"), [

@@ -12,13 +12,13 @@ import time
 import numpy as np
 import pytest
 
-from facegen.errors import FileError, TableError
+from facegen.errors import FileError
 from facegen.fileio.avatar import load_avatar
 from facegen.geometry.mesh import Mesh
 from facegen.studio import reading
 from facegen.studio.counting import triangles
 from facegen.studio.limits import Limits
-from facegen.studio.reading import read_avatar_safely, read_data_safely
+from facegen.studio.reading import read_avatar_safely
 from facegen.transfer.rig import avatar_files, avatar_names
 
 LIMITS = Limits(read_seconds=20.0, read_bytes=1 << 30)
@@ -96,12 +96,12 @@ def test_triangles_are_counted_before_anything_is_made(tmp_path, monkeypatch):
     (tmp_path / "a.glb").write_bytes(_glb(_scene(27_000)))
     (tmp_path / "b.glb").write_bytes(_glb(_scene(3, nodes=9000)))
     (tmp_path / "a.obj").write_bytes(b"v 0 0 0\n" + b"f 1 1 1\n" * 9000)
-    with pytest.raises(FileError, match="9,000 triangles; the studio opens avatars of up to 8,000"):
+    with pytest.raises(FileError, match="9,000 triangles, the studio takes up to 8,000"):
         read_avatar_safely(tmp_path / "a.glb", Limits(triangles=8000))
     monkeypatch.setattr(reading, "load_avatar", lambda path: pytest.fail("it was read"))
     for name in ("a.ply", "a.stl", "a.glb", "b.glb", "a.obj"):
         assert triangles(tmp_path / name) == 9000
-        with pytest.raises(FileError, match="9,000 triangles; the studio opens avatars of up to 8,000"):
+        with pytest.raises(FileError, match="9,000 triangles, the studio takes up to 8,000"):
             reading._avatar(tmp_path / name, 8000)
 
 
@@ -161,28 +161,3 @@ def test_a_program_in_the_folder_is_not_run(tmp_path, monkeypatch, shipped):
     (tmp_path / "json.py").write_text("raise SystemExit('run')")
     monkeypatch.chdir(tmp_path)
     assert read_avatar_safely(shipped).kind == "obj"
-
-
-def test_hostile_yaml_is_told_of(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    path = tmp_path / "a.yaml"
-    for text in ("!!python/object/apply:os.system ['touch owned']", "a: &x [1]\nb: [*x, *x]"):
-        path.write_text(text)
-        with pytest.raises((TableError, FileError), match=r"a\.yaml"):
-            read_data_safely(path, LIMITS)
-    for text in ("a: !!python/name:os.system", "a: &a [*a]", "[" * 5000, "{a: " * 5000, "a: 1\na: 2", "a: [", "\x00",
-                 "- " * 5000, "a: !!set {b, c}"):
-        path.write_text(text)
-        with pytest.raises((TableError, FileError), match=r"a\.yaml"):
-            reading._data(path, 0)
-    assert not (tmp_path / "owned").exists()
-
-
-def test_good_data_are_read(tmp_path):
-    (tmp_path / "a.yaml").write_text("a: [1, 2.5, x]\nb: {c: true}\n")
-    (tmp_path / "b.json").write_text('{"a": [1, null, "ü"]}')
-    assert read_data_safely(tmp_path / "a.yaml") == {"a": [1, 2.5, "x"], "b": {"c": True}}
-    assert read_data_safely(tmp_path / "b.json") == {"a": [1, None, "ü"]}
-    (tmp_path / "c.yaml").write_text("a: " + "x" * 5_000_000)
-    with pytest.raises(FileError, match="larger than 4 MB"):
-        read_data_safely(tmp_path / "c.yaml")

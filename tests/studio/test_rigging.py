@@ -8,14 +8,15 @@ import pytest
 from facegen.errors import InputError
 from facegen.face.avatar import AvatarFace
 from facegen.face.face import load_face
+from facegen.fileio.avatar import load_avatar, save_avatar
 from facegen.studio import rigging
-from facegen.studio.avatar_file import open_avatar
+from facegen.studio.avatar_file import keep, open_avatar
 from facegen.studio.desk import Desk
 from facegen.studio.picking import as_places, removed
 from facegen.studio.rigging import RigMaker, posed
 from facegen.studio.task import Stopped
 from facegen.studio.work import AvatarWork
-from facegen.transfer.landmarks import load_landmarks
+from facegen.transfer.landmarks import load_landmarks, snap
 from facegen.transfer.rig import avatar_files
 
 NAME = "work-of-one"
@@ -60,6 +61,8 @@ def test_it_is_a_face_of_the_work_and_of_no_other(made):
 def test_whatever_changes_the_shapes_makes_the_file_old(made, change):
     _, maker, work, opened, *_ = made
     assert not maker.is_made(replace(work, **change), opened)
+    assert maker.is_there(opened)
+    assert not maker.is_there(replace(opened, avatar=replace(opened.avatar, digest="0" * 64))), "another avatar's"
     assert maker.is_made(replace(work, symmetric=False, skipped={"jaw_L": True}), opened)
 
 
@@ -115,6 +118,18 @@ def test_pieces_are_known_before_anything_is_made_and_can_be_overruled(made):
     assert {row["name"].split("|")[0]: row["kind"] for row in other}["cap"] == "carried"
 
 
-def test_a_vrm_stays_one(made):
-    opened = made[3]
-    assert replace(opened, name="me.vrm", path=opened.path.with_name("me.vrm")).output == "me.vrm"
+def test_a_vrm_stays_one(tmp_path):
+    """The cartoon as another program's file: in another folder, under another name, with a face that the work shows."""
+    source, marks = avatar_files("cartoon", None)
+    save_avatar(load_avatar(source), tmp_path / "me.vrm", {})
+    desk = Desk(tmp_path / "works")
+    maker = RigMaker(desk.store.folder_of(NAME))
+    opened = open_avatar(maker.folder, keep(maker.folder, "me.vrm", (tmp_path / "me.vrm").read_bytes()))
+    cartoon = load_avatar(source).mesh
+    places = snap(load_landmarks(marks, cartoon).points(cartoon.vertices), opened.avatar.mesh)
+    work = AvatarWork(file="me.vrm", landmarks=as_places(places), sets="vrm")
+    made = maker.make(work, opened, silent)
+    assert made.path.name == "me.vrm"
+    assert "me.vrm" in desk.face_names(NAME)
+    face = desk.face("me.vrm", NAME)
+    assert np.abs(face.pose_shapes({"aa": 1.0}) - face.pose("neutral")).max() > 5.0

@@ -15,7 +15,7 @@ from facegen.studio import front, needs
 def test_the_version_is_pinned(viser):
     assert viser.__version__ == needs.VERSION
     project = (Path(__file__).parents[2] / "pyproject.toml").read_text("utf-8")
-    assert f'studio = ["viser=={needs.VERSION}"]' in project
+    assert f'studio = ["viser=={needs.VERSION}",' in project
 
 
 def test_another_viser_is_refused(viser, monkeypatch):
@@ -56,7 +56,7 @@ def test_every_message_that_viser_handles_is_known(viser, studio_server):
 
 
 def test_a_part_is_what_viser_s_page_cuts(viser):
-    from facegen.studio.wire import PART
+    from facegen.studio.gate import PART
 
     source = Path(viser.__file__).parent / "client/src/components/UploadButton.tsx"
     if not source.exists():
@@ -70,8 +70,8 @@ def test_a_page_s_connection_and_elements_are_found(serve, raw):
 
     made = []
     server = serve(lambda client, work: made.append(
-        (client, client.gui.add_slider("smile", 0, 1, 0.1, 0), client.gui.add_upload_button("open"),
-         client.gui.add_dropdown("who", ("a", "b")))))
+        (client, client.gui.add_slider("smile", 0, 1, 0.1, 0),
+         client.gui.add_upload_button("open", mime_type=".glb,.OBJ"), client.gui.add_dropdown("who", ("a", "b")))))
     page = raw(server).begin()
     page.elements(3)
     client, slider, upload, choice = made[0]
@@ -79,8 +79,8 @@ def test_a_page_s_connection_and_elements_are_found(serve, raw):
     assert connection.request.path == "/w/" + "a" * 20
     assert seam.client_of(server.viser, connection) is client
     found = seam.element(server.viser, client, slider._impl.uuid)
-    assert (found.value, found.least, found.most, found.files) == (0, 0, 1, False)
-    assert seam.element(server.viser, client, upload._impl.uuid).files
+    assert (found.value, found.least, found.most, found.files) == (0, 0, 1, None)
+    assert seam.element(server.viser, client, upload._impl.uuid).files == (".glb", ".obj")
     assert tuple(seam.element(server.viser, client, choice._impl.uuid).options) == ("a", "b")
     assert seam.element(server.viser, client, "none") is None
     slider.remove()

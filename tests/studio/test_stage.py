@@ -7,6 +7,7 @@ import pytest
 from fake_client import FakeClient
 
 import facegen
+from facegen.geometry.mesh import Mesh
 from facegen.studio.figure import SCALE, Figure, coloured
 from facegen.studio.stage import Stage
 
@@ -135,3 +136,11 @@ def test_riders_go_along_until_they_leave(stage):
     stage.request("face", lambda: mesh.vertices + 2)
     stage.settle()
     assert seen == [mesh.vertices[0, 0] + 1]
+
+
+def test_a_figure_that_was_removed_is_asked_in_vain():
+    figure = Figure(FakeClient().scene, "one", Mesh.of(np.eye(3), [[0, 1, 2]]))
+    figure.remove()
+    figure.show(2 * np.eye(3))
+    figure.visible(False)
+    figure.fade(0.5)
