@@ -50,7 +50,7 @@ def test_two_faces_are_keyed_scrubbed_played_and_taken_away(studio, browser_page
     page.page.get_by_text("Save as").click()
     page.choose("What", "Recording: facegen's own (.csv)")
     found = facegen.load_performance(page.download(tmp_path, lambda: page.press("Save")))
-    assert found.weights[-1].max() == 1.0
+    assert 0.999 < found.weights[-1].max() < 1.0    # the last frame is a moment before the key
     assert found.weights[0].max() == 0.0
     assert len(found) == 100                        # 4 s, 25 a second
 
