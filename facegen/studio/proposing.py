@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from facegen.geometry.closest import ClosestPoints
 from facegen.geometry.mesh import Mesh
 from facegen.geometry.operators import Surface
+from facegen.landmarking.confidence import RECOGNISED
 from facegen.landmarking.propose import Proposer
 from facegen.studio.landmark_words import ORDER, partner
 from facegen.studio.picking import Place, as_landmarks, place, point
@@ -22,7 +23,7 @@ from facegen.transfer.landmark_checks import place_faults
 
 Array = NDArray[np.float64]
 
-FOUND = 0.6
+FOUND = RECOGNISED
 """From this sureness on, 0..1, a face was found without any point placed."""
 
 # A guess that is less sure than this is not worth a look.
