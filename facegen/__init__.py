@@ -31,7 +31,10 @@ if TYPE_CHECKING:
     from facegen.face.avatar import AvatarFace
     from facegen.face.convert import Conversion, convert
     from facegen.face.face import Controls, Face, load_face
+    from facegen.face.gaze import look_at
     from facegen.face.named import face_names
+    from facegen.facs.blend import blend
+    from facegen.facs.chance import random_expression
     from facegen.facs.deformation import Deformation, load_deformation
     from facegen.facs.expression_table import people
     from facegen.facs.expressions import Resolution, presets, resolve
@@ -86,6 +89,7 @@ __all__ = [
     "Wireframe",
     "adopt",
     "avatar_names",
+    "blend",
     "canonical",
     "contact_sheet",
     "convert",
@@ -104,11 +108,13 @@ __all__ = [
     "load_performance",
     "load_person",
     "load_units",
+    "look_at",
     "morph",
     "parse",
     "people",
     "presets",
     "propose_landmarks",
+    "random_expression",
     "render",
     "render_passes",
     "resolve",
@@ -142,7 +148,10 @@ _HOMES = {
     "facegen.face.avatar": ("AvatarFace",),
     "facegen.face.convert": ("Conversion", "convert"),
     "facegen.face.face": ("Controls", "Face", "load_face"),
+    "facegen.face.gaze": ("look_at",),
     "facegen.face.named": ("face_names",),
+    "facegen.facs.blend": ("blend",),
+    "facegen.facs.chance": ("random_expression",),
     "facegen.facs.deformation": ("Deformation", "load_deformation"),
     "facegen.facs.expression_table": ("people",),
     "facegen.facs.expressions": ("Resolution", "presets", "resolve"),

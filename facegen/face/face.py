@@ -330,6 +330,16 @@ class Face:
             raise InputError(f"units: expected {', '.join(UNITS)}, got {units!r}{nearest(str(units), UNITS)}")
         return weighted_sum([(1.0, self._converted(one, units)) for one in several])
 
+    def possible(self, deformation: Deformation) -> Deformation:
+        """Return a movement without what this face has not: folds, points, and points that take no vector."""
+        def has(name: str) -> bool:
+            return self._point(name, False) is not None
+
+        points, folds = deformation.points, deformation.folds
+        return replace(deformation, points={name: points[name] for name in points if has(name)},
+                       folds={name: folds[name] for name in folds if name in self._data.folds},
+                       with_jaw=tuple(filter(has, deformation.with_jaw)))
+
     def _converted(self, deformation: Deformation, units: str) -> Deformation:
         """Return the same movements in another unit of length; what this face lacks keeps its numbers."""
         if deformation.units == units:

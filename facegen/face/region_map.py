@@ -23,6 +23,9 @@ _COARSE = 1
 _AT_ONCE = 400          # rays, so that a search takes some tens of megabytes
 _INSIDE = -1e-9         # barycentric weights down to this are inside
 
+TINTS = 6
+"""Colours that tell neighbours apart: four would do on any map, chosen one by one they may take more."""
+
 
 @dataclass(frozen=True, eq=False)
 class RegionMap:

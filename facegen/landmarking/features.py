@@ -35,7 +35,9 @@ _BAND, _CLIMB = 11.0, 2
 
 
 # Lips are seen as a line, or open by no more than this share of the mouth's width.
-_OPEN = 0.35
+_OPEN = 1.0
+# What lies this much deeper than the lips, mm, is the mouth's inside.
+_CAVITY = 8.0
 # The tip of the nose is the foremost place within so many millimetres of where it is expected.
 _TIP = 12.0
 
@@ -141,7 +143,9 @@ def lip_line(skin: Surface, points: Mapping[str, Array]) -> dict[str, Array]:
     up = ndimage.uniform_filter(up, (1, 3))
     jump = np.full_like(up, -1.0)
     jump[2:-2] = (up[3:-1] + up[4:]) / 2 - (up[:-4] + up[1:-3]) / 2         # below less above
-    shown = (view.ids >= 0)
+    aside = (view.left + (np.arange(view.ids.shape[1]) + 0.5) * _PIXEL - middle[0]) / (wide / 2)
+    back = (corners[0][2] + corners[1][2]) / 2 - middle[2]                  # lips curve back round the teeth
+    shown = (view.ids >= 0) & (np.nan_to_num(view.depth, nan=-np.inf) > middle[2] + back * aside**2 - _CAVITY)
     jump[~shown] = np.where(_between(shown), 1.0, -1.0)[~shown]             # an open mouth is a line as well
     i0, j0 = view.pixel(middle)
     band = round(_BAND / _PIXEL)

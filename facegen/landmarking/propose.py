@@ -57,6 +57,8 @@ _HEAD = 90.0
 _MIDDLE = np.array([0.0, -35.0, 0.0])
 # A mirrored place is trusted so far.
 _MIRRORED = 0.9
+# Lids that lie farther aside from their eyeball than this, mm, are drawn to it: a child's are lower in the face.
+_BESIDE_BALL = 4.0
 # The middles of the base face's eyeballs, mm.
 _BALLS = {"L": np.array([28.9, 0.0, 0.0]), "R": np.array([-28.9, 0.0, 0.0])}
 def propose_landmarks(mesh: Mesh | str | os.PathLike[str], known: Mapping[str, Any] | None = None) -> Proposals:
@@ -188,11 +190,31 @@ class Proposer:
         model, search = self._model, self._skin.search
         if sure(alike) < RECOGNISED and len(own) < ENOUGH_TO_START:
             return _Found(laid, alike, {})
+        lids = self._at_balls(laid)
+        if lids:
+            laid = lay(model, search, laid.frame, {**lids, **own}, BENT[2:], laid.vertices)
         seen = self._seen(laid)
-        hold = {**{name: place for name, place in seen.items() if name in model.names}, **own}
+        hold = {**lids, **{name: place for name, place in seen.items() if name in model.names}, **own}
         again = lay(model, search, laid.frame, hold, BENT[-4:], laid.vertices)
         seen = {name: place for name, place in self._seen(again).items() if name not in own}
         return _Found(again, max(alike, likeness(model, again, search)), seen)
+
+    def _at_balls(self, laid: Laid) -> dict[str, Array]:
+        """Return the lids, name -> place (3,) on the mesh, where eyeballs lie elsewhere than the laid face has them."""
+        frame, back = laid.frame, laid.frame.inverse()
+        points = dict(zip(self._model.names, self._model.placing @ laid.vertices, strict=True))
+        rest = self._model.points
+        found = {}
+        for s, ball in self._balls.items():
+            lids = [f"eye_{name}_{s}" for name in ("inner", "outer", "upper", "lower")]
+            before_ball = np.mean([rest[name] for name in lids], axis=0) - _BALLS[s]
+            off = back.apply(ball) + before_ball - np.mean([points[name] for name in lids], axis=0)
+            if np.linalg.norm(off[:2]) > _BESIDE_BALL:
+                found |= {name: points[name] + [off[0], off[1], 0.0] for name in lids}
+        if not found:
+            return {}
+        feet = self._skin.search(frame.apply(np.array(list(found.values()))))
+        return dict(zip(found, feet.points, strict=True))
 
     def _seen(self, laid: Laid) -> dict[str, Array]:
         """Return what is seen of lids and lips, name -> place (3,) on the mesh."""
@@ -201,14 +223,7 @@ class Proposer:
         skin = Surface(back.apply(self.mesh.vertices), self._skin.surface.faces)
         points = dict(zip(self._model.names, self._model.placing @ laid.vertices, strict=True))
         found = {**lip_line(skin, points), **nose_tip(skin, points)}
-        for s in "LR":
-            lids = [f"eye_{name}_{s}" for name in ("inner", "outer", "upper", "lower")]
-            if s in self._balls:                        # the eye is where its ball is, whatever else was laid
-                own = np.mean([points[name] for name in lids], axis=0)
-                base = np.mean([self._model.points[name] for name in lids], axis=0) - _BALLS[s]
-                off = back.apply(self._balls[s]) + base - own
-                points |= {name: points[name] + [*off[:2], 0.0] for name in lids}
-            found |= eye_opening(skin, points, s)
+        found |= eye_opening(skin, points, "L") | eye_opening(skin, points, "R")
         return {name: frame.apply(place) for name, place in found.items()}
 
     def _best_of(self, frames: list[Similarity], count: int) -> list[Laid]:

@@ -58,7 +58,7 @@ class ClipPanel:
         self._picture = gui.add_html("")
         self._time = gui.add_slider("Time (s)", 0.0, timeline.NEW_LENGTH, _STEP, 0.0, marks=(),
                                     hint="Drag to see any moment. Keys are set at this time.")
-        self._time.on_update(calls(lambda: self.seek(self._time.value)))
+        self._time.on_update(calls(self._scrubbed))
         self._play = gui.add_button("Play", hint="Or press Ctrl and the space bar.")
         self._play.on_click(calls(self._play_or_pause))
         gui.add_command("Play or pause", hotkey="space", modifier="cmd/ctrl").on_trigger(calls(self._play_or_pause))
@@ -112,12 +112,8 @@ class ClipPanel:
 
     def seek(self, t: float) -> None:
         """Stop and show a time; without a clip it is where the first key will be."""
-        self.transport.stop()
-        if self.motion is None:
-            self.transport.head = float(t)
-        else:
-            self._showing = True
-            self.transport.seek(t)
+        self._go(t)
+        self._time.value = self._on_slider()
         self._show_head()
 
     def choose(self, chosen: Chosen | None) -> None:
@@ -162,6 +158,8 @@ class ClipPanel:
         several = timeline.tracks(work.clip.script) if work.clip.shown == "clip" else ()
         self._drawing = Drawing(self._length, None if plays is None else curves(plays), several, self.chosen)
         self._time.max = max(self._length, 2 * _STEP)
+        if self._time.value > self._time.max:
+            self._time.value = self._on_slider()
         self._which.visible = work.clip.recording is not None
         self._which.value = _RECORDING if work.clip.shown == "recording" else _CLIP
         self._help.visible = plays is None and not fault
@@ -201,9 +199,9 @@ class ClipPanel:
         return script
 
     def _show_head(self) -> None:
-        head = self.transport.head
-        self._time.value = round(min(max(head, 0.0), float(self._time.max)), 2)
-        playing = self.transport.playing
+        head, playing = self.transport.head, self.transport.playing
+        if playing:
+            self._time.value = self._on_slider()
         self._play.label = "Pause" if playing else "Play"
         self._play.disabled = self.motion is None
         now = time.monotonic()
@@ -216,10 +214,15 @@ class ClipPanel:
         length = f" of {self._length:.2f} s" if self.motion is not None else ""
         self._told_rate.content = f"{head:.2f}{length}{rate}"
 
+    def _on_slider(self) -> float:
+        return round(min(max(self.transport.head, 0.0), float(self._time.max)), 2)
+
     def _told(self) -> None:
         """Show how far it is; called by the transport, which waits for nobody."""
         if self.page.lock.acquire(timeout=_STEP):
             try:
+                if self.transport.head >= self.transport.duration:      # it has stopped at the end
+                    self._time.value = self._on_slider()
                 self._show_head()
             finally:
                 self.page.lock.release()
@@ -228,9 +231,23 @@ class ClipPanel:
         self.sound.play(getattr(self.motion, "sound", None), t, self.page.work.clip.speed)
 
     # -- what is done -------------------------------------------------------------------------------------------
+    def _scrubbed(self) -> None:
+        # The slider is not set meanwhile: what a hand has just sent would be overtaken by what it sent before.
+        self._go(float(self._time.value))
+        self._show_head()
+
+    def _go(self, t: float) -> None:
+        self.transport.stop()
+        if self.motion is None:
+            self.transport.head = t
+        else:
+            self._showing = True
+            self.transport.seek(t)
+
     def _play_or_pause(self) -> None:
         if self.transport.playing:
             self.transport.stop()
+            self._time.value = self._on_slider()
         elif self.motion is not None:
             self._showing = True
             self.transport.play(speed=self.page.work.clip.speed, loop=self.page.work.clip.loop)
@@ -255,8 +272,7 @@ class ClipPanel:
 
     def shows_recording(self) -> None:
         """Look at a recording that has come."""
-        self._showing = True
-        self.transport.seek(0.0)
+        self.seek(0.0)
         self.refresh(self.page.work)
 
     def close(self) -> None:

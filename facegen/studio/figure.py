@@ -71,7 +71,7 @@ class Figure:
             handle.visible = shown
 
     def fade(self, opacity: float | None) -> None:
-        """Let what is inside be seen, or with None no more."""
+        """Let what is inside be seen, or with None no more; one that was taken away is left alone."""
         for handle, _ in self._handles:
             handle.opacity = opacity
 

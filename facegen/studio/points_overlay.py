@@ -31,6 +31,7 @@ _SIZE, _FEWER, _CHOSEN_SIZE = 1.15, 1.8, 1.5     # mm: of a point on a face of m
 _MANY = 40
 _GRIP = 1.8             # times a point's size: so near the mouse takes it
 _TINTED = 0.45          # opacity
+_THROUGH = 0.6          # opacity of the skin while what lies inside is shown
 _PROUD = 0.25           # mm that tints and borders stand before the skin, so that they are not lost in it
 _BESIDE = np.array([2.0, 2.0, 3.0])
 _AXIS = 85.0            # mm of the jaw's axis to either side
@@ -97,12 +98,14 @@ class PointsOverlay:
     def show_inner(self, shown: bool) -> None:
         """Show or hide the centre O and the jaw's axis; the skin is let through while they are."""
         with self._lock:
+            if shown == bool(self._inner):
+                return
             for handle, _ in self._inner:
                 handle.remove()
             self._inner = []
             if shown:
                 self._add_inner()
-            self.figure.fade(0.6 if shown else None)
+            self.figure.fade(_THROUGH if shown else None)
 
     def choose(self, name: str | None, moved: frozenset[str], said: str = "") -> None:
         """Mark a point with its name, and those that were moved by hand."""

@@ -94,12 +94,13 @@ class PointsPanel:
         self._base.visible = self._paper.visible = face is None
         self._numbers.show(raw, face)
         if face is None:
-            self._told.content = _AVATAR.format(name=work.face.rig)
+            self._told.content, self._says.content = _AVATAR.format(name=work.face.rig), ""
             return
         strange = raws.strangers(raw, face)
         self._told.content = _HOW if not strange else (
-            f"{_HOW}\n\n**{len(strange)} of the moved points are not on this face** ({', '.join(strange[:4])}"
-            f"{' ...' if len(strange) > 4 else ''}); choose another face, or *Put back: all points*.")
+            f"{_HOW}\n\n**{len(strange)} of the moved points are not on this face and left out** "
+            f"({', '.join(strange[:4])}{' ...' if len(strange) > 4 else ''}); choose another face, or *Put back: all "
+            "points*.")
         self._units.value = _UNITS[raws.deformation_of(raw).units]
         point = self._chosen
         vector = raws.vector_of(raw, face, point) if point else np.zeros(3)

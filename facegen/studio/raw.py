@@ -119,9 +119,8 @@ def controls_of(work: FaceWork, face: Face, person: Person | None) -> Controls:
 
 def strangers(raw: Raw, face: Face) -> tuple[str, ...]:
     """Return the feature points in raw data that a face has not, or that take no vector there."""
-    known = {name for name, takes in zip(face.feature_points, face.takes_input, strict=True) if takes}
-    known |= {alias for name, alias in face.paper_names.items() if name in known}
-    return tuple(name for name in deformation_of(raw).points if name not in known)
+    found = deformation_of(raw)
+    return tuple(name for name in found.points if name not in face.possible(found).points)
 
 
 def with_own_names(raw: Raw, face: Face) -> Raw:
@@ -142,11 +141,7 @@ def whole_pose(face: Face | None, *several: Deformation, units: str) -> Deformat
         for one in several[1:]:
             total = total + one
         return total
-    total = face.total(*several, units=units)
-    strange = strangers(total.as_dict(), face)
-    return replace(total, points={name: one for name, one in total.points.items() if name not in strange},
-                   folds={name: one for name, one in total.folds.items() if name in face.fold_names},
-                   with_jaw=tuple(name for name in total.with_jaw if name in face.feature_points))
+    return face.possible(face.total(*several, units=units))
 
 
 def _plain(found: Deformation) -> dict[str, Any]:

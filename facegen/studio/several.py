@@ -5,12 +5,16 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
+import numpy as np
+
 from facegen.studio.page import FACE, Page
 
 APART = 235.0
 """Millimetres from middle to middle: heads of the base face's size, ears and hair included."""
 
-_BACK = 620.0           # mm that the camera stands back for each face beside the first
+# Where the camera stands for one face, and what its lens of 28 degrees then sees.
+_DISTANCE = 700.0
+_WIDTH_SEEN = 2.0 * np.tan(np.radians(14.0))        # of a square picture, for each mm of distance
 
 
 class Several:
@@ -37,7 +41,8 @@ class Several:
         for k, (name, rig) in enumerate(rigs.items()):
             stage.put(_figure(name), rig.mesh(), colours=rig.colours, offset=self._offset(k))
         if not again:
-            stage.look(distance=700.0 + _BACK * (len(rigs) - 1))
+            aspect = float(getattr(self.page.client.camera, "aspect", 1.0))
+            stage.look(distance=max(_DISTANCE, APART * len(rigs) / (_WIDTH_SEEN * aspect)))
 
     def hide(self) -> None:
         """Have the page's own face back."""

@@ -71,10 +71,15 @@ class FaceWork:
         return deformation_from_dict(self.raw) if self.raw else Deformation()
 
     def meaning(self, person: Person | None = None, rig: Any = None) -> Resolution:
-        """Return what a rig is to show. person: who ``person`` is (`Desk.person`); their units move their way. rig: the
-        face, whose eyes look at the point that ``gaze`` says; without one they do not."""
+        """Return what a rig is to show.
+
+        person: who ``person`` is (`Desk.person`); their units move their way. rig: the face, whose eyes look at the
+        point that ``gaze`` says; without one they do not. Feature points that it has not are left out.
+        """
         found = resolve(dict(self.units) or "neutral", person=person, intensity=self.intensity)
         raw = self.deformation * self.intensity
+        if hasattr(rig, "possible"):            # moved on another face; the tab of points says so
+            raw = rig.possible(raw)
         if self.gaze and rig is not None:
             return _gazing(found, raw, self.gaze, rig)
         return replace(found, more=(*found.more, raw)) if raw else found

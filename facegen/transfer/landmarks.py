@@ -78,16 +78,21 @@ def load_landmarks(path: Path | str, mesh: Mesh, *, mesh_name: str = "", digest:
     missing or doubled names, places the mesh does not have, left and right swapped, a place on the wrong part, or a
     file for another mesh.
     """
+    return load_checked(path, mesh, mesh_name=mesh_name, digest=digest, partial=partial)[0]
+
+
+def load_checked(path: Path | str, mesh: Mesh, *, mesh_name: str = "", digest: str = "", partial: bool = False
+                 ) -> tuple[Landmarks, list[str]]:
+    """Return what `load_landmarks` does, and what `check_places` has to warn of."""
     about, entries = landmark_entries(path, partial=partial)
     if about is not None:
         _check_mesh(about, mesh, mesh_name, digest)
     found = {name: read_landmark(entry, len(mesh.vertices), mesh.faces, mesh.parts) for name, entry in entries.items()}
     try:
         landmarks = _snap(found, mesh)
-        check_places(landmarks, mesh, partial=partial)
+        return landmarks, check_places(landmarks, mesh, partial=partial)
     except InputError as error:
         raise TableError(f"{path}: {error}") from None
-    return landmarks
 
 
 def check_places(landmarks: Landmarks, mesh: Mesh, *, partial: bool = False) -> list[str]:

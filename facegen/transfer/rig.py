@@ -18,7 +18,7 @@ from facegen.fileio.kept import kept_in
 from facegen.progress import Progress, silent, within
 from facegen.transfer.choices import Choices
 from facegen.transfer.halfway import half_name
-from facegen.transfer.landmarks import check_places, load_landmarks
+from facegen.transfer.landmarks import Landmarks, check_places, load_checked
 from facegen.transfer.pieces import describe
 from facegen.transfer.template import Template, template_of
 from facegen.transfer.template_file import read_template
@@ -80,6 +80,20 @@ def avatar_files(avatar: str | Path, landmarks: str | Path | None, *, what: str 
     return path, marks
 
 
+def _read(avatar: str | Path | AvatarFile, landmarks: str | Path | Landmarks | None
+          ) -> tuple[AvatarFile, Landmarks, list[str]]:
+    """Return an avatar and its landmarks, read and checked, and what is odd about these."""
+    if isinstance(avatar, AvatarFile) and landmarks is not None:
+        source, marks = avatar, landmarks
+    else:
+        file = avatar.path if isinstance(avatar, AvatarFile) else avatar
+        path, marks = avatar_files(file, "" if isinstance(landmarks, Landmarks) else landmarks)
+        source = load_avatar(path)
+    if isinstance(landmarks, Landmarks):
+        return source, landmarks, check_places(landmarks, source.mesh)
+    return source, *load_checked(marks, source.mesh, mesh_name=source.path.name, digest=source.digest)
+
+
 class Rigging:
     """An avatar on its way to blendshapes: read and laid on the template once, its shapes as often as wanted, of which
     only those that a choice changes are computed anew. Not for two threads at a time. ::
@@ -89,16 +103,18 @@ class Rigging:
         rigging.save("cat.glb", opening=1.2)
     """
 
-    def __init__(self, avatar: str | Path, *, landmarks: str | Path | None = None, sets: Sequence[str] | None = None,
-                 shapes: Sequence[str] | None = None, person: str | Path | None = None,
-                 template: str | Path | None = None, template_landmarks: str | Path | None = None,
-                 pieces: Mapping[str, str] | None = None, cache: bool = True) -> None:
-        """Read and check everything; the work is done when it is asked for. All as in `rig`."""
-        path, marks = avatar_files(avatar, landmarks)
+    def __init__(self, avatar: str | Path | AvatarFile, *, landmarks: str | Path | Landmarks | None = None,
+                 sets: Sequence[str] | None = None, shapes: Sequence[str] | None = None,
+                 person: str | Path | None = None, template: str | Path | None = None,
+                 template_landmarks: str | Path | None = None, pieces: Mapping[str, str] | None = None,
+                 cache: bool = True) -> None:
+        """Read and check everything; the work is done when it is asked for.
+
+        avatar, landmarks: as in `rig`, or what `load_avatar` and `snap` gave. Everything else as in `rig`.
+        """
         self._asked = asked = _asked(sets, shapes, person, template, template_landmarks)
-        self.source = load_avatar(path)
-        self.places = load_landmarks(marks, self.source.mesh, mesh_name=path.name, digest=self.source.digest)
-        self.warnings = (*check_places(self.places, self.source.mesh), *_without_expressions(self.source, asked.sets))
+        self.source, self.places, odd = _read(avatar, landmarks)
+        self.warnings = (*odd, *_without_expressions(self.source, asked.sets))
         self._pieces, self._cache = pieces, cache
         self._binding: Binding | None = None
         self._once = False

@@ -27,6 +27,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from facegen.errors import InputError
 from facegen.geometry.closest import ClosestPoints, Feet
 from facegen.geometry.factor import Factor
 from facegen.geometry.fade import smooth_step
@@ -38,6 +39,9 @@ from facegen.transfer.part_motion import nearest_rotations
 _ALONE = 0.05
 # Because each piece that no partner holds would float: everything is tied to its place this much, times the diagonal.
 _TIE = 1e-7
+# No vertex is held by less than this share of the largest entry. Where that is more than the energy holds, it decides
+# alone how a vertex moves: few may be so, at the corners of needles, but not this share of all.
+_LEAST_ENERGY, _MOST_LONE = 1e-12, 0.01
 # A vertex without a partner, in a mouth's depth or on a body, stays where it is with this share of the anchor's weight.
 _STAY = 0.3
 # But a lining, which is without a partner too, moves as the skin over it does, so that it does not come through: wholly
@@ -85,8 +89,10 @@ class Transfer:
         if weights.landmarks:
             matrix = matrix + weights.landmarks * (landmarks.T @ landmarks)
         matrix = sparse.csc_array(matrix)
-        matrix = matrix + sparse.diags_array(_TIE * matrix.diagonal() + 1e-12 * matrix.diagonal().max())
-        self._matrix = matrix
+        energy = matrix.diagonal()
+        least = _LEAST_ENERGY * energy.max()
+        _check_tied(energy > least)
+        self._matrix = matrix + sparse.diags_array(_TIE * energy + least)
         right = weights.gradients * self._gradient_part(surface, template, triangle_feet, turns)
         pulled = sparse.diags_array(anchor) @ (sparse.diags_array(feet.found.astype(float)) + lining)
         right = right + sparse.kron(pulled, sparse.identity(3), format="csr") @ self._carried(template, feet, matrices)
@@ -140,6 +146,15 @@ class Transfer:
             solved = self._factor.solve(right.reshape(n, 3 * k))
             result[start:start + k] = np.moveaxis(solved.reshape(n, 3, k), 2, 0)
         return result
+
+
+def _check_tied(tied: NDArray[np.bool_]) -> None:
+    """Raise InputError if the energy holds too few of the vertices: ``tied`` (n,)."""
+    lone = np.flatnonzero(~tied)
+    if len(lone) > _MOST_LONE * len(tied):
+        raise InputError(f"the transfer to the avatar is singular to working precision: {len(lone)} of {len(tied)} "
+                         f"vertices of the skin (first: {', '.join(map(str, lone[:5]))}) are tied to nothing; give "
+                         "gradients, or anchor, a weight nearer to the others', or leave weights out")
 
 
 def rotation_between(a: NDArray, b: NDArray) -> NDArray[np.float64]:

@@ -1,7 +1,7 @@
 """A person's table is changed line by line: what its owner wrote stays."""
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from facegen.data import tables_dir
@@ -79,12 +79,14 @@ TREES = st.recursive(LEAVES, lambda inner: st.dictionaries(NAMES, inner, max_siz
 TABLES = st.dictionaries(NAMES, TREES, min_size=1, max_size=5)
 
 
+@settings(deadline=None)
 @given(TABLES, TABLES)
 def test_any_table_becomes_any_other(old, new):
     text, _ = changed_text("# kept\n" + yaml_text(old), new)
     assert parse_yaml(text, "t") == new
 
 
+@settings(deadline=None)
 @given(TABLES, TABLES)
 def test_comments_above_what_is_not_touched_stay(old, new):
     new = {**old, **{f"new_{key}": value for key, value in new.items()}}

@@ -1,6 +1,6 @@
 import pytest
 import yaml
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from facegen.errors import InputError
@@ -13,6 +13,7 @@ VALUES = st.recursive(
     lambda inner: st.one_of(st.lists(inner, max_size=4), st.dictionaries(PRINTABLE, inner, max_size=4)), max_leaves=12)
 
 
+@settings(deadline=None)
 @given(st.dictionaries(PRINTABLE, VALUES, min_size=1, max_size=5))
 def test_what_is_written_is_read_back_by_us_and_by_other_readers(data):
     text = yaml_text(data)
@@ -20,6 +21,7 @@ def test_what_is_written_is_read_back_by_us_and_by_other_readers(data):
     assert list(parse_yaml(text, "text")) == list(data)
 
 
+@settings(deadline=None)
 @given(st.dictionaries(PRINTABLE, st.one_of(PRINTABLE, st.floats(-1e3, 1e3).map(lambda x: round(x, 4))), min_size=1))
 def test_other_readers_of_yaml_agree(data):
     assert yaml.safe_load(yaml_text(data)) == data

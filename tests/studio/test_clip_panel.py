@@ -55,6 +55,8 @@ class Opened:
         while not true():
             assert time.monotonic() < end
             time.sleep(0.01)
+        with self.page.lock:                    # what made it true is done
+            return
 
 
 @pytest.fixture

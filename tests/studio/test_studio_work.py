@@ -5,7 +5,7 @@ import stat
 from dataclasses import replace
 
 import pytest
-from hypothesis import given
+from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 import facegen
@@ -17,6 +17,7 @@ from facegen.studio.work import FaceWork, Work
 weights = st.floats(0.0, 1.0, allow_subnormal=False)
 
 
+@settings(deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(st.dictionaries(st.sampled_from(["1", "L2", "R12", "26", "43"]), weights), weights,
        st.dictionaries(st.sampled_from(["jaw_unused", "open"]).filter(lambda key: key == "open"),
                        st.floats(-20, 20, allow_subnormal=False)))

@@ -7,6 +7,7 @@ from scipy.spatial import cKDTree
 from facegen.errors import InputError
 from facegen.fileio.avatar import load_avatar
 from facegen.transfer import registration, skin
+from facegen.transfer.landmarks import Landmarks, load_landmarks
 from facegen.transfer.margins import LIDS, facing_margins
 from facegen.transfer.rig import Rigging, avatar_files, rig
 
@@ -90,6 +91,21 @@ def test_only_some(cartoon):
         rigging.shapes(["jawOpn"])
     with pytest.raises(InputError, match="AU12_L"):
         rigging.shapes(["AU12_L"])
+
+
+def test_an_avatar_and_landmarks_that_are_read_already(cartoon):
+    _, found = cartoon
+    path, marks = avatar_files("cartoon", None)
+    avatar = load_avatar(path)
+    places = load_landmarks(marks, avatar.mesh)
+    for one, other in ((avatar, places), (avatar, marks), ("cartoon", places)):
+        made = Rigging(one, landmarks=other, sets=["arkit"]).shapes(["jawOpen"])
+        same(made.shapes, {"jawOpen": found.shapes["jawOpen"]})
+    with pytest.raises(InputError, match="landmarks: expected the file"):
+        Rigging(avatar)
+    short = Landmarks(places.names[1:], places.faces[1:], places.corners[1:], places.barycentric[1:])
+    with pytest.raises(InputError, match=f"'{places.names[0]}' missing"):
+        Rigging(avatar, landmarks=short)
 
 
 def test_a_stop_leaves_it_as_good_as_before(cartoon):

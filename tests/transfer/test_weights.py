@@ -81,3 +81,15 @@ def test_weights_decide_what_the_avatar_gets(tmp_path, capsys):
     with pytest.raises(InputError, match="the method 'sumner' has none to choose"):
         rig("cartoon", tmp_path / "d.glb", method="sumner", weights="paper", sets=["vrm"])
     assert not (tmp_path / "d.glb").exists()
+
+
+@pytest.mark.parametrize("weights", [
+    "gradients=0,anchor=0", "gradients=1e-9,landmarks=1e9,anchor=0", "preset=paper,gradients=0,smooth=0,identity=0"])
+def test_a_singular_system_is_refused_not_solved(tmp_path, capsys, weights):
+    """Landmarks alone, or so much heavier that the others are lost in rounding, say nothing of the skin between."""
+    out = tmp_path / "c.glb"
+    assert main(["rig", "cartoon", "--shapes", "aa", "--set", "vrm", "--weights", weights, "-o", str(out)]) == 2
+    said = capsys.readouterr().err
+    assert re.search(r"singular to working precision: \d+ of \d+ vertices|cannot be solved", said)
+    assert "tied to nothing" in said
+    assert not out.exists()
