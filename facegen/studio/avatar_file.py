@@ -72,7 +72,8 @@ def safe_name(name: str, taken: tuple[str, ...] = TAKEN, kind: str = "an avatar"
 def keep(folder: Path, name: str, content: bytes) -> str:
     """Keep a file that came from a browser in a work's folder and return its name there; InputError if it is too much.
 
-    It is read before it is kept, by a process of its own: what cannot be opened leaves what was there as it was.
+    Another file of the same name stays: who undoes goes back to it. The file is read before it is kept, by a process of
+    its own.
     """
     name = safe_name(name)
     if len(content) > LIMITS.file_bytes:
@@ -80,6 +81,7 @@ def keep(folder: Path, name: str, content: bytes) -> str:
                          f"{LIMITS.file_bytes / MEBIBYTE:.0f}; leave out pictures and clothes, or use the command "
                          "facegen rig")
     place = make_folder(folder / FOLDER)
+    name = _free(place, name, content)
     with whole_file(place / name, "the avatar ") as draft:
         trial = draft.with_suffix(Path(name).suffix)            # readers go by it
         try:
@@ -89,6 +91,15 @@ def keep(folder: Path, name: str, content: bytes) -> str:
             trial.replace(draft)
         finally:
             trial.unlink(missing_ok=True)
+    return name
+
+
+def _free(place: Path, name: str, content: bytes) -> str:
+    """Return a name that is free in a folder, or that of the same file there."""
+    path, number = Path(name), 1
+    while (place / name).exists() and (place / name).read_bytes() != content:
+        number += 1
+        name = f"{path.stem}-{number}{path.suffix}"
     return name
 
 

@@ -7,7 +7,6 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from facegen.face.landmarks import REQUIRED
 from facegen.fileio.textfile import make_folder, save_text
 from facegen.studio import picking
 from facegen.studio.avatar_file import (
@@ -52,7 +51,7 @@ class AvatarPanel:
             with gui.add_folder("Landmarks as a file", expand_by_default=False):
                 self._make_files(gui)
         with gui.add_folder("3 Blendshapes"):
-            self.rigging = RiggingView(page, self.scene)
+            self.rigging = RiggingView(page, self.scene, self.picker.stop)
 
     def _make_open(self, gui: Any) -> None:
         calls = self.page.calls
@@ -95,7 +94,9 @@ class AvatarPanel:
                 self.picker.forget()
                 self.rigging.forget()
         self._refresh_file(work.avatar)
-        self.scene.show(work.avatar, bool(self._seen.value) and not self.rigging.compares)
+        opened = self.scene.opened
+        is_face = opened is not None and work.face.rig == opened.output and not self.picker.wishes
+        self.scene.show(work.avatar, bool(self._seen.value) and not self.rigging.compares and not is_face)
         self.picker.refresh(work)
         self.rigging.refresh(work)
 
@@ -179,10 +180,13 @@ class AvatarPanel:
         save_text(given.content.decode("utf-8", "replace"), path)
         opened = self.scene.opened
         with called(path, given.name):
-            found = load_landmarks(path, mesh, mesh_name=opened.path.name, digest=opened.avatar.digest)
+            found = load_landmarks(path, mesh, mesh_name=opened.path.name, digest=opened.avatar.digest,
+                                   partial=True)
         avatar = replace(self.page.work.avatar, landmarks=picking.as_places(found))
         self.page.change("load landmarks", avatar=avatar)
-        self.page.say(f"{len(found.names)} points, all {len(REQUIRED)} that are needed among them.", "Landmarks loaded")
+        left, count = len(picking.missing(avatar)), len(found.names)
+        more = f"; {left} that are needed are missing." if left else "."
+        self.page.say(f"{count} point{'s' * (count != 1)}{more}", "Landmarks loaded")
 
     def _remove_all(self) -> None:
         self.page.change("remove all points", avatar=replace(self.page.work.avatar, landmarks={}, skipped={}))

@@ -43,6 +43,7 @@ class AvatarScene:
         self.figure: Figure | None = None
         self.placement = Similarity(1.0, np.eye(3), np.zeros(3))
         self._stands: tuple | None = None
+        self._gone: str | None = None               # what could not be opened, and was told
 
     @property
     def mesh(self) -> Mesh:
@@ -59,12 +60,15 @@ class AvatarScene:
             return name is not None
         try:
             found = open_avatar(self.page.desk.store.folder_of(self.page.name), work.file)
+            if not fits(found.avatar.mesh, work.landmarks):
+                raise InputError(f"avatar: '{work.file}' is another mesh than the one that its points were placed on; "
+                                 "open it again")
         except FacegenError as error:
-            if name is not None or self._stands != (work.file, "gone"):
-                self._stands = (work.file, "gone")
+            if self._gone != work.file:
                 self.page.say(str(error), "That avatar is gone", colour="red")
-            self.opened = None
+            self.opened, self._gone = None, work.file
             return name is not None
+        self._gone = None
         another = self.opened is None or found.avatar is not self.opened.avatar
         self.opened = found
         self._stands = None if another else self._stands

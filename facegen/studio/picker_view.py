@@ -86,7 +86,12 @@ class PickerView:
     @property
     def on(self) -> bool:
         """Whether points are being placed."""
-        return bool(self._on.value) and self.scene.figure is not None
+        return self.wishes and self.scene.figure is not None
+
+    @property
+    def wishes(self) -> bool:
+        """Whether the person wishes to place points, be there an avatar or not."""
+        return bool(self._on.value)
 
     @property
     def _looks(self) -> bool:
@@ -96,6 +101,10 @@ class PickerView:
     def start(self) -> None:
         """Begin to place points."""
         self._on.value = True
+
+    def stop(self) -> None:
+        """Place no more points."""
+        self._on.value = False
 
     def forget(self) -> None:
         """Another avatar has come: nothing is known of it."""
@@ -265,7 +274,7 @@ class PickerView:
 
     def _switched(self) -> None:
         self._asked = ()
-        self.refresh(self.page.work)
+        self.page.refresh()
 
     # -- proposals ----------------------------------------------------------------------------------------------
     def _advise(self) -> Adviser:

@@ -10,22 +10,20 @@ from functools import cached_property, lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from facegen.errors import InputError
 from facegen.geometry.closest import ClosestPoints
 from facegen.geometry.mesh import Mesh
 from facegen.geometry.operators import Surface
+from facegen.landmarking.confidence import RECOGNISED
 from facegen.landmarking.propose import Proposer
 from facegen.studio.landmark_words import ORDER, partner
-from facegen.studio.picking import Place, as_landmarks, missing, place, point
+from facegen.studio.picking import Place, as_landmarks, place, point
 from facegen.studio.placement import axes, nearest_axes
 from facegen.studio.work import AvatarWork
-from facegen.transfer.alignment import align
-from facegen.transfer.landmark_checks import average_face
-from facegen.transfer.landmarks import check_places
+from facegen.transfer.landmark_checks import place_faults
 
 Array = NDArray[np.float64]
 
-FOUND = 0.6
+FOUND = RECOGNISED
 """From this sureness on, 0..1, a face was found without any point placed."""
 
 # A guess that is less sure than this is not worth a look.
@@ -93,20 +91,18 @@ class Adviser:
         self.ready = True
         guesses = {name: proposed[name] for name in ORDER if name in proposed and name not in known
                    and proposed[name].confidence >= _LEAST}
-        errors, warnings = self._faults(work)
+        errors = self._errors(work)
         return Advice({name: place(one.face, one.barycentric) for name, one in guesses.items()},
                       {name: one.confidence for name, one in guesses.items()}, proposed.ask, proposed.face,
-                      _standing({name: one.xyz for name, one in proposed.items()}) if proposed.face >= FOUND else None,
-                      errors, tuple(dict.fromkeys((*proposed.warnings, *warnings))))
+                      nearest_axes(proposed.frame.rotation.T) if proposed.face >= FOUND and proposed.frame else None,
+                      errors, tuple(each for each in proposed.warnings if each not in errors))
 
-    def _faults(self, work: AvatarWork) -> tuple[tuple[str, ...], tuple[str, ...]]:
-        """Return (errors, warnings), sentences, about the points of a work, once all are placed."""
-        if missing(work):
-            return (), ()
-        try:
-            return (), tuple(check_places(as_landmarks(self.mesh, work.landmarks), self.mesh))
-        except InputError as error:
-            return tuple(str(error).removeprefix("landmarks: ").split("; ")), ()
+    def _errors(self, work: AvatarWork) -> tuple[str, ...]:
+        """Return what must be wrong about the points of a work, a sentence each."""
+        if not work.landmarks:
+            return ()
+        marks = as_landmarks(self.mesh, work.landmarks)
+        return tuple(place_faults(marks.names, marks.corners, marks.barycentric, self.mesh)[0])
 
     def nearest(self, at: Array) -> Place:
         """Return the place of the mesh that is nearest to a point (3,), in the mesh's units."""
@@ -134,11 +130,3 @@ class Adviser:
         else:
             normal = axes(work.up, work.front)[0]
         return normal, np.mean(middles, axis=0) if middles else self._middle
-
-
-def _standing(points: Mapping[str, Array]) -> tuple[str, str] | None:
-    """Return the axes in which a face with landmarks at points (3,) stands and looks."""
-    try:
-        return nearest_axes(align(points, average_face()).rotation)
-    except InputError:
-        return None

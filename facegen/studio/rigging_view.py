@@ -41,10 +41,10 @@ _HEAD = (100.0, 140.0)
 
 
 class RiggingView:
-    """The controls of step 3, made where the panel stands."""
+    """The controls of step 3, made where the panel stands. used: called when the avatar becomes the page's face."""
 
-    def __init__(self, page: Page, scene: AvatarScene) -> None:
-        self.page, self.scene = page, scene
+    def __init__(self, page: Page, scene: AvatarScene, used: Callable[[], None]) -> None:
+        self.page, self.scene, self._used = page, scene, used
         self.maker = rigging.RigMaker(page.desk.store.folder_of(page.name))
         self.task: Task | None = None               # what makes blendshapes or draws them
         self._face: Any = None                      # the avatar with its blendshapes, as last made
@@ -264,6 +264,7 @@ class RiggingView:
 
     def _use_it(self) -> None:
         self._compare.value = False
+        self._used()
         self.page.change("use the avatar", face=replace(self.page.work.face, rig=self.scene.opened.output))
         self.page.stage.look()
 

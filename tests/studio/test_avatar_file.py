@@ -50,8 +50,10 @@ def test_what_is_kept_is_found_again(tmp_path):
     assert "1 triangles, 1 part" in found.summary
     assert found.output == "My_cat.glb"
     assert open_avatar(tmp_path, "My_cat.obj").avatar is found.avatar
-    assert keep(tmp_path, "My cat.obj", TRIANGLE + b"v 0 0 1\nf 1 2 4\n") == "My_cat.obj"
-    assert len(open_avatar(tmp_path, "My_cat.obj").avatar.mesh.faces) == 2
+    assert keep(tmp_path, "My cat.obj", TRIANGLE) == "My_cat.obj"
+    assert keep(tmp_path, "My cat.obj", TRIANGLE + b"v 0 0 1\nf 1 2 4\n") == "My_cat-2.obj"
+    assert len(open_avatar(tmp_path, "My_cat-2.obj").avatar.mesh.faces) == 2
+    assert len(open_avatar(tmp_path, "My_cat.obj").avatar.mesh.faces) == 1, "who undoes has the first again"
 
 
 def test_an_obj_files_colours_come_with_a_file_of_their_own(tmp_path):

@@ -1,5 +1,7 @@
 """The Avatar tab with a client that is no browser: clicks are rays, and what they make is in the work."""
 
+import json
+from dataclasses import replace
 from typing import ClassVar
 
 import numpy as np
@@ -59,7 +61,6 @@ class Opened:
 
     def place_all(self):
         """Have all true landmarks placed."""
-        from dataclasses import replace
         self.page.change("all", avatar=replace(self.work, landmarks=as_places(self.marks)))
 
 
@@ -210,7 +211,6 @@ def test_points_that_are_wrong_are_said_in_words(opened):
     opened.place_all()
     swapped = {**opened.work.landmarks, "eye_inner_L": opened.work.landmarks["eye_outer_L"],
                "eye_outer_L": opened.work.landmarks["eye_inner_L"]}
-    from dataclasses import replace
     opened.page.change("swap", avatar=replace(opened.work, landmarks=swapped))
     assert opened.panel.picker.settle()
     said = opened.panel.picker._faults
@@ -226,6 +226,27 @@ def test_points_that_are_wrong_are_said_in_words(opened):
     opened.page.undo()
     assert opened.panel.picker.settle()
     assert "swapped" not in said.content
+
+
+def test_swapped_points_are_told_while_most_are_still_missing(opened):
+    true = as_places(opened.marks)
+    few = {name: true[name] for name in ("eye_inner_L", "eye_outer_L", "nose_tip", "mouth_corner_L", "chin",
+                                         "eye_inner_R", "eye_outer_R", "mouth_corner_R")}
+    for swapped in ({}, {"mouth_corner_L": few["mouth_corner_R"], "mouth_corner_R": few["mouth_corner_L"]}):
+        opened.page.change("few", avatar=replace(opened.work, landmarks={**few, **swapped}))
+        assert opened.panel.picker.settle()
+        said = opened.panel.picker._faults
+        assert said.visible == bool(swapped)
+    assert "**Corner of the mouth, left** and **Corner of the mouth, right** are swapped" in said.content
+
+
+def test_landmarks_of_another_mesh_are_told_and_the_page_lives(opened):
+    far = {"chin": picking.place(10**6, (1.0, 0.0, 0.0))}
+    opened.page.change("tampered", avatar=replace(opened.work, landmarks=far))
+    assert "another mesh" in opened.client.notices[-1][1]
+    assert opened.panel.scene.figure is None
+    opened.page.undo()
+    assert opened.panel.scene.figure is not None
 
 
 def test_landmarks_go_to_a_file_and_come_back(opened):
@@ -247,6 +268,12 @@ def test_landmarks_go_to_a_file_and_come_back(opened):
     (_, said), = opened.client.notices
     assert "the landmarks are of a mesh with the hash" in said
     assert opened.work.landmarks == {}
+    opened.gui.find("Or try one").enter("cat")
+    few = b"landmarks:\n  chin: " + json.dumps(kept["chin"]).encode()
+    load.enter(Upload("few.yaml", few))
+    assert opened.work.landmarks.keys() == {"chin"}, "what was begun can be gone on with"
+    assert opened.client.notices[-1] == ("Landmarks loaded", "1 point; 24 that are needed are missing.")
+    opened.page.undo()
     for hostile in (b"", b"\xff\xfe", b"landmarks: [", b"a: &a [*a]", b"landmarks: {chin: 99999999}"):
         opened.client.notices.clear()
         load.enter(Upload("x.yaml", hostile))
