@@ -16,9 +16,9 @@ from facegen.studio.export_view import ExportView
 from facegen.studio.keys_view import KeysView
 from facegen.studio.page import Page
 from facegen.studio.recording_view import RecordingView
-from facegen.studio.script_box import TextBox
 from facegen.studio.sound_view import SoundView
 from facegen.studio.speech_view import SpeechView
+from facegen.studio.text_box import TextBox
 from facegen.studio.timeline_picture import Chosen, Drawing
 from facegen.studio.transport import Transport
 from facegen.studio.work import SPEED, FaceWork, Work

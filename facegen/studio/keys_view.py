@@ -10,7 +10,7 @@ from facegen.animation.idle import Idle
 from facegen.animation.timing import load_timing
 from facegen.studio import keying, timeline
 from facegen.studio.page import Page
-from facegen.studio.script_box import TextBox
+from facegen.studio.text_box import TextBox
 from facegen.studio.timeline_picture import Chosen
 from facegen.studio.vocabulary import plain
 from facegen.studio.work import Work

@@ -130,11 +130,9 @@ def test_a_rig_that_cannot_show_it_is_told_once(played):
 
 
 def test_its_thread_ends(played):
-    name = "facegen studio transport"
-    before = sum(one.name == name for one in threading.enumerate())
+    before = set(threading.enumerate())
     one = Transport(played.page, told=lambda: None)
+    mine, = (each for each in threading.enumerate() if each not in before)
     one.close()
-    for thread in threading.enumerate():
-        if thread.name == name:
-            thread.join(0.5)
-    assert sum(each.name == name for each in threading.enumerate()) == before
+    mine.join(30.0)
+    assert not mine.is_alive()
