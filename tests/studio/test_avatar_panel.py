@@ -204,7 +204,7 @@ def test_optional_points_can_be_skipped_and_any_point_be_placed_anew(opened):
     assert opened.work.skipped == {"jaw_L": True}
     opened.gui.find("Skip the optional points").press()
     assert opened.panel.picker.wanted(opened.work) is None
-    assert not opened.gui.find("Make blendshapes").disabled
+    assert wait(lambda: not opened.gui.find("Make blendshapes").disabled)
 
 
 def test_points_that_are_wrong_are_said_in_words(opened):
