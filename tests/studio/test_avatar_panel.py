@@ -222,7 +222,7 @@ def test_points_that_are_wrong_are_said_in_words(opened):
     (title, text), = opened.client.notices
     assert title == "That cannot be"
     assert text.startswith("Landmarks: **Inner corner, left eye** and")
-    assert not opened.gui.find("Make blendshapes").disabled
+    assert wait(lambda: not opened.gui.find("Make blendshapes").disabled)
     opened.page.undo()
     assert opened.panel.picker.settle()
     assert "swapped" not in said.content
