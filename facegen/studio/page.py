@@ -45,11 +45,14 @@ class Panel(Protocol):
 class Page:
     """``client``: viser's handle; ``name``: of the work; ``desk``; ``stage``; ``rig``: the face that is shown.
 
-    panels: title of the tab -> what makes its panel from the page.
+    panels: title of the tab -> what makes its panel from the page. changed: called with the page and its work after
+    each change that was made here, the page's lock held.
     """
 
-    def __init__(self, client: Any, name: str, desk: Desk, panels: dict[str, Callable[[Page], Panel]]) -> None:
+    def __init__(self, client: Any, name: str, desk: Desk, panels: dict[str, Callable[[Page], Panel]],
+                 changed: Callable[[Page, Work], None] = lambda page, work: None) -> None:
         self.client, self.name, self.desk = client, name, desk
+        self._tell = changed
         self.lock = threading.RLock()
         work, told = desk.store.load(name)
         self.history = History(work)
@@ -119,10 +122,18 @@ class Page:
             self._set_face(self.work.face)
             self._refresh()
 
+    def follow(self, work: Work) -> None:
+        """Take over what was changed on another page of the same work."""
+        with self.lock:
+            if self.history.change("a change in another window", work, thing="another window"):
+                self._set_face(work.face)
+                self._refresh()
+
     def _changed(self) -> None:
         self.desk.store.save(self.name, self.work)
         self._set_face(self.work.face)
         self._refresh()
+        self._tell(self, self.work)
 
     def _refresh(self) -> None:
         self._steps.refresh(self.history)

@@ -12,6 +12,7 @@ from typing import Any
 from facegen.facs.blend import blend
 from facegen.facs.expression_table import Person
 from facegen.studio.page import Page
+from facegen.studio.seam import set_icon
 from facegen.studio.thumbnails import Thumbnails
 from facegen.studio.vocabulary import plain, search, vocabulary
 from facegen.studio.work import FaceWork, Work
@@ -127,8 +128,7 @@ class Palette:
 
     def _picture(self, name: str, button: Any, *, on: bool) -> None:
         html = f'<img class="fg-thumb{" fg-on" if on else ""}" alt="" src="{self._pictures.get(name, _EMPTY)}">'
-        if getattr(button, "_icon_html", None) != html:
-            button._icon_html = html            # viser 1.1.1: what `icon` would set, from its own icons only
+        set_icon(button, html)
 
     def _mixed(self, face: FaceWork) -> None:
         """Show the sliders of a mixture."""

@@ -125,6 +125,12 @@ def end_upload(client: viser.ClientHandle, upload: UploadStart) -> None:
     client._websock_connection.queue_message(_messages.RemoveNotificationMessage(f"upload-{upload.transfer_uuid}"))
 
 
+def set_icon(button: viser.GuiButtonHandle, html: str) -> None:
+    """Show HTML of our own on a button, where viser's ``icon`` knows only its own icons."""
+    if getattr(button, "_icon_html", None) != html:
+        button._icon_html = html
+
+
 def refuse_share(server: viser.ViserServer, refuse: Callable[..., None]) -> None:
     """Take away every way by which a page or a caller makes viser open a tunnel to elsewhere."""
     from viser import _messages

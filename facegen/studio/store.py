@@ -28,16 +28,20 @@ class Store:
         self._lock = threading.Lock()
         self._writing = threading.Lock()
         self._timer: threading.Timer | None = None
+        self._failing: set[str] = set()
         self._failed: Callable[[str, FileError], None] = lambda name, error: None
 
     def on_failure(self, call: Callable[[str, FileError], None]) -> None:
-        """Have ``call(name, error)`` called when a work could not be saved."""
+        """Have ``call(name, error)`` called when a work could not be saved, once until it can be again."""
         self._failed = call
 
     def folder_of(self, name: str) -> Path:
         """Return the folder of a work, private to this user, made if need be."""
         folder = make_folder(self.folder / name)
-        folder.chmod(0o700)
+        try:
+            folder.chmod(0o700)
+        except OSError as error:
+            raise FileError(f"{folder}: cannot be made private: {error.strerror or error}") from error
         return folder
 
     def load(self, name: str) -> tuple[Work, str | None]:
@@ -76,8 +80,12 @@ class Store:
                 try:
                     self.folder_of(name)
                     save_text(json.dumps(work.plain(), indent=1), self.folder / name / _FILE)
-                except FileError as error:
-                    self._failed(name, error)
+                except FileError as error:              # it waits on, and the next change tries again
+                    if name not in self._failing:
+                        self._failing.add(name)
+                        self._failed(name, error)
+                    continue
+                self._failing.discard(name)
                 with self._lock:
                     if self._waiting.get(name) is work:
                         del self._waiting[name]

@@ -87,6 +87,17 @@ def test_a_page_s_connection_and_elements_are_found(serve, raw):
     assert seam.element(server.viser, client, slider._impl.uuid) is None
 
 
+def test_a_button_takes_html_of_ours(serve, raw):
+    from facegen.studio import seam
+
+    made = []
+    server = serve(lambda client, work: made.append(client.gui.add_button("choose")))
+    page = raw(server).begin()
+    page.elements(1)
+    seam.set_icon(made[0], "<b>ours</b>")
+    assert page.until("GuiUpdateMessage", uuid=made[0]._impl.uuid)["updates"] == {"_icon_html": "<b>ours</b>"}
+
+
 def test_nothing_of_viser_s_is_printed_and_nothing_stays_changed(serve, capsys):
     import rich
     import websockets.asyncio.server

@@ -133,15 +133,20 @@ def test_an_unreadable_work_is_set_aside_and_told(tmp_path, text):
     assert store.load("one") == (smiling(0.2), None)
 
 
-def test_a_work_that_cannot_be_saved_is_told(tmp_path):
+def test_a_work_that_cannot_be_saved_is_told_once_and_saved_when_it_can_be(tmp_path):
     store, said = Store(tmp_path), []
     store.on_failure(lambda name, error: said.append((name, error)))
     (tmp_path / "one").write_text("a file where the folder should be")
-    store.save("one", smiling(0.5))
-    store.flush()
+    for weight in (0.5, 0.6):
+        store.save("one", smiling(weight))
+        store.flush()
     (name, error), = said
     assert name == "one"
     assert isinstance(error, FileError)
+    assert store.load("one") == (smiling(0.6), None)
+    (tmp_path / "one").unlink()
+    store.flush()
+    assert Store(tmp_path).load("one") == (smiling(0.6), None)
 
 
 def test_a_section_checks_itself():
