@@ -5,10 +5,8 @@ from __future__ import annotations
 import os
 import threading
 from collections.abc import Callable
-from functools import partial
 from typing import Any
 
-from facegen.errors import FacegenError
 from facegen.studio.desk import Desk
 from facegen.studio.files import Shelf
 from facegen.studio.latest import Latest
@@ -46,6 +44,7 @@ class Studio:
         page = Page(client, work, self.desk, self._panels, self._changed)
         with self._lock:
             self.pages[client.client_id] = page
+        page.follow()                       # what another window changed while this page was made
         if client.client_id not in self.server.viser.get_clients():     # it went while it was made
             self._went(client, work)
 
@@ -71,9 +70,9 @@ class Studio:
                     # In a thread of its own: the other page's lock is not waited for with this one's held.
                     follower = self._followers.get(number) or Latest("window", other.fault)
                     self._followers[number] = follower
-                follower.ask(partial(other.follow, work))
+                follower.ask(other.follow)
 
-    def _not_saved(self, work: str, error: FacegenError) -> None:
+    def _not_saved(self, work: str, error: Exception) -> None:
         for page in self._of(work):
             page.say(f"{error}; what you do is not kept.", "Your work cannot be saved", colour="red", closes=None)
 

@@ -81,7 +81,7 @@ def keep(folder: Path, name: str, content: bytes) -> str:
                          f"{LIMITS.file_bytes / MEBIBYTE:.0f}; leave out pictures and clothes, or use the command "
                          "facegen rig")
     place = make_folder(folder / FOLDER)
-    name = _free(place, name, content)
+    name = free(place, name, content)
     with whole_file(place / name, "the avatar ") as draft:
         trial = draft.with_suffix(Path(name).suffix)            # readers go by it
         try:
@@ -94,13 +94,20 @@ def keep(folder: Path, name: str, content: bytes) -> str:
     return name
 
 
-def _free(place: Path, name: str, content: bytes) -> str:
+def free(place: Path, name: str, content: bytes) -> str:
     """Return a name that is free in a folder, or that of the same file there."""
     path, number = Path(name), 1
-    while (place / name).exists() and (place / name).read_bytes() != content:
+    while _taken(place, name) or ((place / name).exists() and (place / name).read_bytes() != content):
         number += 1
         name = f"{path.stem}-{number}{path.suffix}"
     return name
+
+
+def _taken(place: Path, name: str) -> bool:
+    """Return whether another avatar's blendshapes would go into the same file: cat.obj's and cat.ply's into cat.glb."""
+    stem = Path(name).stem
+    return stem in avatar_names() or any(one.name != name and one.stem == stem and one.suffix in TAKEN
+                                         for one in place.iterdir())
 
 
 def keep_from(folder: Path, path: Path) -> str:

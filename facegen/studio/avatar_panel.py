@@ -185,7 +185,7 @@ class AvatarPanel:
         avatar = replace(self.page.work.avatar, landmarks=picking.as_places(found))
         self.page.change("load landmarks", avatar=avatar)
         left, count = len(picking.missing(avatar)), len(found.names)
-        more = f"; {left} that are needed are missing." if left else "."
+        more = f"; {left} needed one{'s are' if left > 1 else ' is'} missing." if left else "."
         self.page.say(f"{count} point{'s' * (count != 1)}{more}", "Landmarks loaded")
 
     def _remove_all(self) -> None:

@@ -6,7 +6,6 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
-from facegen.animation.clip import Clip
 from facegen.errors import InputError
 from facegen.facs.deformation import Deformation, weighted_sum
 from facegen.facs.expressions import resolve
@@ -49,14 +48,6 @@ def key_face(item: Mapping[str, Any], face: FaceWork, default: str | None = None
     raw = deformation_data(item, found.deformation if not found.units else None)
     return replace(face, units=dict(found.units), blend={}, gaze={}, raw=raw,
                    intensity=float(item.get("intensity", 1.0)))
-
-
-def moment_face(clip: Clip, t: float, face: FaceWork) -> FaceWork:
-    """Return a face that shows a moment of a clip, its raw movements too."""
-    found = clip.at(t)
-    raw = [one for one in found.more if one]
-    return replace(face, units={code: round(weight, 4) for code, weight in clip.units_at(t).items()}, blend={}, gaze={},
-                   intensity=1.0, raw=weighted_sum([(1.0, one) for one in raw]).as_dict() if raw else {})
 
 
 def deformation_data(item: Mapping[str, Any], pose: Deformation | None) -> Mapping[str, Any]:

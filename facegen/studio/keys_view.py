@@ -115,9 +115,9 @@ class KeysView:
         self._cut = gui.add_button("End when all is over", color="gray")
         self._cut.on_click(calls(lambda: self._host.edit("end when all is over", timeline.shorten(self._host.script),
                                                          self._host.chosen)))
-        self._idle = gui.add_checkbox("Lives meanwhile", False, hint="Blinks, small movements of eyes and head.")
+        self._idle = gui.add_checkbox("Blinks and small movements", False, hint="Of eyes and head, as if alive.")
         self._idle.on_update(calls(self._lives))
-        self._seed = gui.add_number("By chance", 1, min=0, max=9999, step=1, hint="The same number, the same blinks.")
+        self._seed = gui.add_number("Seed", 1, min=0, max=9999, step=1, hint="The same number, the same blinks.")
         self._seed.on_update(calls(self._lives))
 
     # -- what is shown ------------------------------------------------------------------------------------------

@@ -10,6 +10,7 @@ import functools
 import inspect
 import logging
 import threading
+import time
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Any, Protocol
@@ -30,6 +31,7 @@ FACE = "face"
 
 _DRAWN = 0.1            # seconds
 _CLOSES = 8.0           # seconds until a notice goes
+_AGAIN = 4.0            # seconds until the same may be said again: a drag asks for it sixty times a second
 
 
 class Panel(Protocol):
@@ -54,6 +56,8 @@ class Page:
         self.client, self.name, self.desk = client, name, desk
         self._tell = changed
         self.lock = threading.RLock()
+        self.closed = False
+        self._said = "", "", 0.0
         work, told = desk.store.load(name)
         self.history = History(work)
         self.stage = Stage(client, self.fault)
@@ -122,14 +126,17 @@ class Page:
             self._set_face(self.work.face)
             self._refresh()
 
-    def follow(self, work: Work) -> None:
-        """Take over what was changed on another page of the same work."""
+    def follow(self) -> None:
+        """Take over what was changed on another page of the same work: what is saved last holds on all."""
         with self.lock:
+            work, _ = self.desk.store.load(self.name)
             if self.history.change("a change in another window", work, thing="another window"):
                 self._set_face(work.face)
                 self._refresh()
 
     def _changed(self) -> None:
+        if self.closed:         # a Task that ends late: the page that was loaded since has the work
+            return
         self.desk.store.save(self.name, self.work)
         self._set_face(self.work.face)
         self._refresh()
@@ -203,17 +210,21 @@ class Page:
     def fault(self, error: Exception) -> None:
         """Tell a fault: what was asked for cannot be, or facegen's own."""
         if isinstance(error, FacegenError):
-            self.say(str(error), "That cannot be", colour="red")
+            self.say(str(error), "That did not work", colour="red")
             return
         log.error("work %s: %s: %s", self.name, type(error).__name__, error, exc_info=error)
         self.say(f"{type(error).__name__}: {error}", "A fault of facegen's own; please report it", colour="red")
 
-    def say(self, text: str, title: str = "", *, colour: str | None = None, closes: float | None = _CLOSES) -> Any:
-        """Show a notice and return its handle."""
-        return self.client.add_notification(title, text, color=colour, auto_close_seconds=closes)
+    def say(self, text: str, title: str = "", *, colour: str | None = None, closes: float | None = _CLOSES) -> None:
+        """Show a notice; what was just said is not said again."""
+        now = time.monotonic()
+        if self._said[:2] != (title, text) or now - self._said[2] > _AGAIN:
+            self._said = title, text, now
+            self.client.add_notification(title, text, color=colour, auto_close_seconds=closes)
 
     def close(self) -> None:
         """End what runs and save."""
+        self.closed = True
         for panel in self._panels:
             panel.close()
         self.stage.close()

@@ -40,7 +40,7 @@ class RecordingView:
         self._upload.on_upload(calls(self._uploaded))
         self._place = gui.add_folder("At work", visible=False)
         with gui.add_folder("Clean it up", visible=False) as self._clean:
-            self._rest = gui.add_dropdown("Take the rest off", (_NO, *_HOW), initial_value=_NO,
+            self._rest = gui.add_dropdown("Subtract the resting face", (_NO, *_HOW), initial_value=_NO,
                                           hint="Trackers take a face at rest for one that frowns or smiles a little.")
             self._rest.on_update(calls(self._chose_rest))
             self._when = gui.add_text("Which", "", hint="From-to in seconds, such as 0-1, or a percentile such as 5%.")

@@ -53,7 +53,9 @@ def keep(folder: Path, name: str, content: bytes, work: ClipWork, *,
     if len(content) > LIMITS.file_bytes:
         raise InputError(f"file: '{name}' has {len(content) / MEBIBYTE:.0f} MB, the studio takes up to "
                          f"{LIMITS.file_bytes / MEBIBYTE:.0f}; cut it, or use the command facegen play")
-    with whole_file(make_folder(folder / FOLDER) / name, "the recording ") as draft:
+    place = make_folder(folder / FOLDER)
+    name = avatar_file.free(place, name, content)
+    with whole_file(place / name, "the recording ") as draft:
         trial = draft.with_suffix(Path(name).suffix)            # readers go by it
         try:
             trial.write_bytes(content)

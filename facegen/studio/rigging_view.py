@@ -161,26 +161,32 @@ class RiggingView:
 
     def _pose(self, work: Work) -> None:
         face = work.face if self.tuning.look is None else self.tuning.look
-        wanted = (face, work.avatar, self._face)
+        wanted = (face, self.page.person(), work.avatar, self._face)
         if wanted == self._seen:
             return
         self._seen = wanted
         if self.tuning.look is None:
-            meaning = face.meaning()
+            person = self.page.person()
             self.page.show_face()
+
+            def means(rig: Any) -> Any:
+                return face.meaning(person, rig)
         else:
-            meaning, own = load_face().resolve(face), self.page.rig
-            self.page.stage.request(FACE, lambda: own.pose(meaning))
+            looked, own = load_face().resolve(face), self.page.rig
+            self.page.stage.request(FACE, lambda: own.pose(looked))
+
+            def means(rig: Any) -> Any:
+                return looked
         if TEMPLATE in self.page.stage.figures:
             base = self.page.desk.face(FaceWork().rig, self.page.name)
-            self.page.stage.request(TEMPLATE, lambda: base.pose(meaning))
+            self.page.stage.request(TEMPLATE, lambda: base.pose(means(base)))
         rigged, opened = self._face, self.scene.opened
         if self._current or rigging.missing(work.avatar):
             if self.page.stage.figures[RIGGED].mesh is not rigged.mesh():
                 self._stand(rigged.mesh())
-            self.page.stage.request(RIGGED, lambda: rigged.pose(meaning))
+            self.page.stage.request(RIGGED, lambda: rigged.pose(means(rigged)))
         else:
-            self._working.ask(lambda: self._tune_to(work.avatar, opened, rigged, meaning))
+            self._working.ask(lambda: self._tune_to(work.avatar, opened, rigged, means(rigged)))
 
     def _tune_to(self, avatar: AvatarWork, opened: Any, face: AvatarFace, meaning: Any) -> None:
         """Show what the choices make of an expression; runs beside the page."""
@@ -296,7 +302,8 @@ def _state(opened: bool, left: int, made: bool, current: bool) -> str:
     if not opened:
         return "First open an avatar."
     if left:
-        return f"First place the {left} points that are missing in step 2."
+        return f"First place the {left} missing points in step 2." if left > 1 else \
+            "First place the missing point in step 2."
     if made and not current:
         return "Something has changed since the blendshapes were made: **make them again** to have it in the file."
     return "The avatar has its blendshapes." if made else "Everything is there."

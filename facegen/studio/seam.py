@@ -6,6 +6,7 @@ The version is pinned, and tests/studio/test_seam.py has a test of each use, to 
 from __future__ import annotations
 
 import contextlib
+import re
 import sys
 import threading
 from collections.abc import Callable, Iterator
@@ -24,6 +25,8 @@ if TYPE_CHECKING:
     from facegen.studio.wire import UploadStart
 
 PROTOCOL = f"viser-v{VERSION}"
+
+_MARKS = re.compile(r"(<(?=[A-Za-z/!?])|!(?=\[))")
 
 
 def page_file() -> Path:
@@ -123,6 +126,35 @@ def end_upload(client: viser.ClientHandle, upload: UploadStart) -> None:
     client._websock_connection.queue_message(_messages.FileTransferPartAck(
         upload.source_component_uuid, upload.transfer_uuid, transferred_bytes=0, total_bytes=0))
     client._websock_connection.queue_message(_messages.RemoveNotificationMessage(f"upload-{upload.transfer_uuid}"))
+
+
+def only_words(client: viser.ClientHandle) -> None:
+    """Have a page's Markdown hold neither HTML, which viser puts into the page as it is, nor pictures, whose files it
+    reads: names and warnings come from strangers' files.
+
+    An invisible joiner after the sign keeps both from being read as such, and shows the same in text and in code.
+    """
+    import viser
+
+    class Words(viser.GuiMarkdownHandle):
+        @property
+        def content(self) -> str:
+            return self._content
+
+        @content.setter
+        def content(self, content: str) -> None:
+            viser.GuiMarkdownHandle.content.fset(self, _MARKS.sub("\\1\N{WORD JOINER}", content))
+            self._content = content
+
+    add = client.gui.add_markdown
+
+    def add_markdown(content: str, **named: Any) -> viser.GuiMarkdownHandle:
+        handle = add("", **named)
+        handle.__class__ = Words
+        handle.content = content
+        return handle
+
+    client.gui.add_markdown = add_markdown
 
 
 def set_icon(button: viser.GuiButtonHandle, html: str) -> None:

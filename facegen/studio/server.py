@@ -292,6 +292,7 @@ class StudioServer:
         if connection is None:      # it went before it came
             return
         work = self._works[client.client_id] = guard.work_of(connection.request.path.partition("?")[0])
+        self._seam.only_words(client)
         if self._on_page is not None:
             self._on_page(client, work)
 

@@ -29,9 +29,9 @@ class Store:
         self._writing = threading.Lock()
         self._timer: threading.Timer | None = None
         self._failing: set[str] = set()
-        self._failed: Callable[[str, FileError], None] = lambda name, error: None
+        self._failed: Callable[[str, Exception], None] = lambda name, error: None
 
-    def on_failure(self, call: Callable[[str, FileError], None]) -> None:
+    def on_failure(self, call: Callable[[str, Exception], None]) -> None:
         """Have ``call(name, error)`` called when a work could not be saved, once until it can be again."""
         self._failed = call
 
@@ -80,7 +80,7 @@ class Store:
                 try:
                     self.folder_of(name)
                     save_text(json.dumps(work.plain(), indent=1), self.folder / name / _FILE)
-                except FileError as error:              # it waits on, and the next change tries again
+                except (FileError, TypeError, ValueError) as error:     # it waits on, and the next change tries again
                     if name not in self._failing:
                         self._failing.add(name)
                         self._failed(name, error)

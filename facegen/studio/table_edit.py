@@ -103,7 +103,7 @@ def unit_says(data: Data, code: str) -> str:
     unit = load_catalogue().unit_of(code)
     keys = [key for key in dict.fromkeys((code, *_atoms(unit, code), unit.number)) if key in own]
     if not keys:
-        return "moves as everybody's"
+        return f"{code}: everybody's movement"
     scales = {key: own[key].get("scale") for key in keys}
     return "; ".join(f"{key}: {scale:g} times the common movement" if scale is not None else
                      f"{key}: a movement of this person's own" for key, scale in scales.items())

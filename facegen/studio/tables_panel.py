@@ -95,9 +95,9 @@ class TablesPanel:
         found = edit.recipes(table.data)
         set_options(self._expression, tuple(sorted(found, key=lambda name: (not found[name].own, name))), _FIRST)
         self._recipe_of(found)
-        code = self._code
-        self._says.content = f"On {table.data.get('name', 'everybody')} {code} {edit.unit_says(table.data, code)}." \
-            if table.file else "Everybody's movement."
+        code, whose = self._code, table.data.get("name", "everybody")
+        self._says.content = f"On {whose}, {edit.unit_says(table.data, code)}." if table.file else \
+            "Everybody's movement."
         self._scale.value = min(edit.scale_of(table.data, code), 2.0)
         for handle in (self._change, self._add, self._common, self._scale, self._take, self._back,
                        self._save):

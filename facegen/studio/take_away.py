@@ -21,12 +21,13 @@ _SIZES = ("256", "512", "1024", "2048", "1920x1080")
 _USUAL = FaceWork()
 
 
-def command(face: FaceWork, *, size: str = "512", raw: str = "face.yaml") -> str:
+def command(face: FaceWork, *, size: str = "512", raw: str = "face.yaml", rig: str | None = None,
+            person: str | None = None) -> str:
     """Return the command line that draws the face of a work; raw movements are in a file, which goes with it."""
     what = raw if face.raw or face.gaze else face.script
     parts = ["facegen", "render", what]
-    parts += ["--face", face.rig] if face.rig != _USUAL.rig else []
-    parts += ["--person", face.person] if face.person and what != raw else []
+    parts += ["--face", rig or face.rig] if face.rig != _USUAL.rig else []
+    parts += ["--person", person or face.person] if face.person and what != raw else []
     # A file holds the movements as they are shown, intensity and all.
     parts += ["--intensity", f"{face.intensity:g}"] if face.intensity != 1.0 and what != raw else []
     parts += ["--size", size] if size != "512" else []
@@ -91,4 +92,7 @@ class TakeAway:
 
     def refresh(self, work: Work) -> None:
         """Show the command of a work."""
-        self._command.value = command(work.face, size=self._size.value)
+        face, desk, name = work.face, self._page.desk, self._page.name
+        own = face.person is not None and face.person.endswith(".yaml")
+        self._command.value = command(face, size=self._size.value, rig=desk.face_file(face.rig, name),
+                                      person=str(desk.person_file(face.person, name)) if own else None)

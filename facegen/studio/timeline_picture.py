@@ -45,7 +45,6 @@ class Drawing:
         if shown is not None:
             parts += self._draw_curves(shown, y)
             y += _CURVES
-        self._axis_top = _TOP
         for track in several[:_MOST_LANES]:
             parts += self._lane(track, y, chosen)
             y += _LANE

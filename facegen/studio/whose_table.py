@@ -6,7 +6,7 @@ from collections.abc import Callable
 from typing import Any
 
 from facegen.data import tables_dir
-from facegen.errors import InputError
+from facegen.errors import FacegenError, InputError
 from facegen.facs.expression_table import people
 from facegen.facs.person_file import Change, person_change, read_person_data
 from facegen.facs.yamlfile import MAX_BYTES, read_data
@@ -53,7 +53,11 @@ class WhoseTable:
         if table.person is None:
             return f"**{table.data.get('name', table.file)}** is like everybody yet: change something."
         path = self.page.desk.person_file(table.file, self.page.name)
-        if path.exists() and read_data(path) == table.data:
+        try:
+            saved = path.exists() and read_data(path) == table.data
+        except FacegenError as error:           # broken by another hand: said here, and the page goes on
+            return f"**{table.file}** cannot be read:\n```\n{str(error).replace('```', '')}\n```"
+        if saved:
             return f"**{table.file}** is saved as it is here. Choose it as *Person* on the tab Face."
         return f"**{table.file}** has changes that are not saved."
 

@@ -76,11 +76,13 @@ class FaceWork:
         person: who ``person`` is (`Desk.person`); their units move their way. rig: the face, whose eyes look at the
         point that ``gaze`` says; without one they do not. Feature points that it has not are left out.
         """
-        found = resolve(dict(self.units) or "neutral", person=person, intensity=self.intensity)
+        gazes = bool(self.gaze) and rig is not None
+        units = {code: weight for code, weight in self.units.items() if not (gazes and _turns_eyes(code))}
+        found = resolve(units or "neutral", person=person, intensity=self.intensity)
         raw = self.deformation * self.intensity
         if hasattr(rig, "possible"):            # moved on another face; the tab of points says so
             raw = rig.possible(raw)
-        if self.gaze and rig is not None:
+        if gazes:
             return _gazing(found, raw, self.gaze, rig)
         return replace(found, more=(*found.more, raw)) if raw else found
 
@@ -104,6 +106,12 @@ def _gazing(found: Resolution, raw: Deformation, gaze: Mapping[str, float], rig:
     eyes = look_at(rig, [gaze[axis] for axis in "xyz"], head=[*turned, 0.0])
     more = (one for one in (raw, Deformation(eyes=eyes)) if one)
     return replace(found, deformation=units, more=(*found.more, *more))
+
+
+def _turns_eyes(code: str) -> bool:
+    """Return whether a unit turns an eye: a gaze takes its place, lids and all."""
+    table = load_units()
+    return any(table.basis[name].eyes for name in table.coefficients({code: 1.0}))
 
 
 @dataclass(frozen=True)

@@ -92,3 +92,31 @@ def test_what_cannot_be_saved_is_told_in_the_windows_of_the_work(windows):
     studio.desk.store._failed("one-work", FileError("work.json: no space left"))
     assert one.client.notices[-1][0] == "Your work cannot be saved"
     assert other.client.notices == []
+
+
+def test_a_task_that_ends_after_its_page_changes_nothing(windows):
+    studio, opened = windows
+    old = opened("one-work")
+    studio._went(old.client, "one-work")                # the page was loaded again
+    new = opened("one-work")
+    new.change("smile", face=FaceWork(units={"12": 0.5}))
+    old.change("an upload was read", face=FaceWork(units={"4": 1.0}))
+    settled(studio)
+    studio.desk.store.flush()
+    assert studio.desk.store.load("one-work")[0] == new.work
+    assert new.work.face.units == {"12": 0.5}
+
+
+def test_a_window_that_opens_while_another_changes_has_the_change(windows, monkeypatch):
+    studio, opened = windows
+    one = opened("one-work")
+    load = studio.desk.store.load
+
+    def late(name):
+        found = load(name)
+        monkeypatch.setattr(studio.desk.store, "load", load)
+        one.change("meanwhile", face=FaceWork(units={"12": 0.5}))
+        return found
+
+    monkeypatch.setattr(studio.desk.store, "load", late)
+    assert opened("one-work").work == one.work

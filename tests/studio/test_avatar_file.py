@@ -23,6 +23,8 @@ from facegen.studio.limits import Limits
 from facegen.transfer.rig import avatar_files, avatar_names
 
 TRIANGLE = b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"
+_PLY = (b"ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
+        b"element face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n")
 
 
 @given(st.text(max_size=80), st.sampled_from(TAKEN))
@@ -58,16 +60,18 @@ def test_what_is_kept_is_found_again(tmp_path):
 
 def test_an_obj_files_colours_come_with_a_file_of_their_own(tmp_path):
     source = avatar_files("cartoon", None)[0]
-    opened = open_avatar(tmp_path, keep(tmp_path, "cartoon.obj", source.read_bytes()))
+    opened = open_avatar(tmp_path, keep(tmp_path, "painted.obj", source.read_bytes()))
     assert lost_colours(opened) == "cartoon.mtl"
-    with pytest.raises(InputError, match=r"has no colours of cartoon\.obj, which has them in cartoon\.mtl"):
+    with pytest.raises(InputError, match=r"has no colours of painted\.obj, which has them in cartoon\.mtl"):
         keep_colours(tmp_path, opened, "other.mtl", b"")
     with pytest.raises(InputError, match="too large"):
         keep_colours(tmp_path, opened, "cartoon.mtl", bytes(2_000_000))
     keep_colours(tmp_path, opened, "../../cartoon.mtl", source.with_suffix(".mtl").read_bytes())
-    again = open_avatar(tmp_path, "cartoon.obj")
+    again = open_avatar(tmp_path, "painted.obj")
     assert lost_colours(again) is None
     assert again.avatar.colours == open_avatar(tmp_path, "cartoon").avatar.colours
+    assert keep(tmp_path, "cartoon.obj", source.read_bytes()) == "cartoon-2.obj", "one of that name ships"
+    assert keep(tmp_path, "painted.ply", _PLY) == "painted-2.ply", "both would be rigged into painted.glb"
     copy = tmp_path / "other"
     assert open_avatar(copy, keep_from(copy, source)).avatar.colours == again.avatar.colours
 

@@ -220,7 +220,7 @@ def test_points_that_are_wrong_are_said_in_words(opened):
     assert wait(lambda: opened.client.notices)
     assert wait(lambda: opened.panel.rigging.task is None)
     (title, text), = opened.client.notices
-    assert title == "That cannot be"
+    assert title == "That did not work"
     assert text.startswith("Landmarks: **Inner corner, left eye** and")
     assert wait(lambda: not opened.gui.find("Make blendshapes").disabled)
     opened.page.undo()
@@ -272,13 +272,13 @@ def test_landmarks_go_to_a_file_and_come_back(opened):
     few = b"landmarks:\n  chin: " + json.dumps(kept["chin"]).encode()
     load.enter(Upload("few.yaml", few))
     assert opened.work.landmarks.keys() == {"chin"}, "what was begun can be gone on with"
-    assert opened.client.notices[-1] == ("Landmarks loaded", "1 point; 24 that are needed are missing.")
+    assert opened.client.notices[-1] == ("Landmarks loaded", "1 point; 24 needed ones are missing.")
     opened.page.undo()
     for hostile in (b"", b"\xff\xfe", b"landmarks: [", b"a: &a [*a]", b"landmarks: {chin: 99999999}"):
         opened.client.notices.clear()
         load.enter(Upload("x.yaml", hostile))
         assert len(opened.client.notices) == 1, hostile
-        assert opened.client.notices[0][0] == "That cannot be", hostile
+        assert opened.client.notices[0][0] == "That did not work", hostile
         assert "/" not in opened.client.notices[0][1].split(":")[0], "the file is called as its owner calls it"
     assert opened.work.landmarks == {}
 
@@ -290,7 +290,7 @@ def test_an_upload_is_kept_with_the_work_and_found_after_a_reload(tmp_path):
     assert wait(lambda: first.work.file)
     assert first.work.file == "my_cat.obj"
     first.gui.find("Open an avatar").enter(Upload("bad.glb", b"glTF"))
-    assert wait(lambda: [title for title, _ in first.client.notices if title == "That cannot be"])
+    assert wait(lambda: [title for title, _ in first.client.notices if title == "That did not work"])
     assert first.work.file == "my_cat.obj"
     assert ("Colours are missing", "They are in cat.mtl: open that file too.") in first.client.notices
     plain = first.panel.scene.figure

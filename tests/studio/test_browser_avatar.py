@@ -80,7 +80,7 @@ def test_an_avatar_is_opened_rigged_and_taken_away(opened, tmp_path, shots):
     bad = tmp_path / "bad.glb"
     bad.write_bytes(b"glTF" + bytes(40))
     browser.upload("Open an avatar", bad)
-    browser.says("That cannot be")
+    browser.says("That did not work")
     browser.upload("Open an avatar", source)
     browser.until(lambda: panel.scene.figure is not None)
     assert page.work.avatar.file == "my_cartoon.obj"

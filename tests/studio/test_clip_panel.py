@@ -200,7 +200,7 @@ def test_a_recording_comes_plays_and_is_found_again(opened, tmp_path):
     wanted = Playback(facegen.load_performance(path)).on(opened.page.rig)(0.5)
     assert np.abs(wanted - opened.page.rig.pose("neutral")).max() > 5.0
     assert opened.at(0.5).seen() == pytest.approx(wanted)
-    opened.gui.find("Take the rest off").enter("by what it mostly is")
+    opened.gui.find("Subtract the resting face").enter("by what it mostly is")
     opened.wait(lambda: opened.panel.recording.playback is not None)
     assert opened.page.work.clip.calibrate == "5%"
     opened.page.close()

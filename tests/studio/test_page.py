@@ -160,5 +160,15 @@ def test_a_task_that_fails_is_told(desk):
         raise InputError("avatar: no triangles")
 
     assert Task(page, "Rig", job, lambda result: None).wait(10)
-    assert page.client.notices == [("That cannot be", "avatar: no triangles")]
+    assert page.client.notices == [("That did not work", "avatar: no triangles")]
+    page.close()
+
+
+def test_the_same_is_not_said_again_and_again(desk):
+    page = opened(desk)
+    for _ in range(30):
+        page.client.gui.find("Script").enter("12F")
+    assert len(page.client.notices) == 1
+    page.client.gui.find("Script").enter("99")
+    assert len(page.client.notices) == 2
     page.close()

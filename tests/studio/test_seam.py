@@ -141,3 +141,18 @@ def test_a_page_that_is_not_viser_s_is_refused(tmp_path):
         front.Page(tmp_path / "index.html")
     with pytest.raises(FacegenError, match="cannot be read"):
         front.Page(tmp_path / "no.html")
+
+
+def test_markdown_holds_no_html_and_no_picture(serve, raw):
+    """viser gives the page HTML as it is, and reads the files of pictures."""
+    said = 'Ada <meta http-equiv="refresh" content="0">, 1 < 2, ![x](/etc/hostname) `<b>` <3'
+    made = []
+    server = serve(lambda client, work: made.append(client.gui.add_markdown(said, visible=True)))
+    page = raw(server).begin()
+    joiner = "\N{WORD JOINER}"
+    expected = said.replace("<m", f"<{joiner}m").replace("![", f"!{joiner}[").replace("<b", f"<{joiner}b")
+    assert page.until("GuiUpdateMessage", updates={"_markdown": expected})
+    assert made[0].content == said
+    made[0].content = "</div>"
+    assert page.until("GuiUpdateMessage", updates={"_markdown": f"<{joiner}/div>"})
+    assert made[0].visible

@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 
 import facegen
 from facegen.errors import FileError, InputError, TableError
+from facegen.facs.tables import load_units
 from facegen.studio.history import STEPS, TOGETHER, History
 from facegen.studio.store import Store
 from facegen.studio.work import FaceWork, Work
@@ -157,3 +158,15 @@ def test_a_section_checks_itself():
 def test_a_new_work_comes_back():
     """Every section as it is before anything is chosen: texts that are empty, what is None."""
     assert Work.read(json.loads(json.dumps(Work().plain()))) == Work()
+
+
+@pytest.mark.parametrize("script", ["61+12D", "63D+6C", "65C+4B"])
+def test_a_gaze_takes_the_place_of_units_that_turn_the_eyes(script):
+    """A rig that is posed by units must not turn the eyes twice."""
+    face = facegen.load_face()
+    units = facegen.parse(script)
+    gaze = {"x": 60.0, "y": -20.0, "z": 400.0}
+    others = {code: one for code, one in units.items() if code not in ("61", "63", "65")}
+    both, alone = (FaceWork(units=one, gaze=gaze).checked().meaning(rig=face) for one in (units, others))
+    assert face.pose(both) == pytest.approx(face.pose(alone), abs=1e-9)
+    assert not any(load_units().basis[name].eyes for name in load_units().coefficients(both.units))

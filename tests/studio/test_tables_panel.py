@@ -71,7 +71,7 @@ def test_from_a_new_person_to_a_file_that_everything_reads(page, tmp_path):
     page.change("person", face=FaceWork(units={"4": 1.0}, person="ada.yaml"))
     assert page.stage.settle()
     assert page.stage.figures[FACE].vertices == pytest.approx(page.rig.pose("4E", person=path))
-    assert not [text for title, text in page.client.notices if title == "That cannot be"]
+    assert not [text for title, text in page.client.notices if title == "That did not work"]
 
 
 def test_a_change_is_seen_at_once_on_several_faces_and_the_own_face_comes_back(page):
@@ -178,3 +178,17 @@ def test_a_work_keeps_its_table_and_refuses_a_broken_one():
     from facegen.errors import TableError
     with pytest.raises(TableError, match="expected a number"):
         Work.read(Work(table=TableWork("ada.yaml", {**table.data, "units": {"12": {"scale": 50}}})).plain())
+
+
+def test_a_table_that_was_broken_meanwhile_does_not_lock_out_of_the_work(page, tmp_path):
+    ada(page)
+    find(page, "Expression").enter("happiness")
+    find(page, "Action units").enter("6B+L12E")
+    find(page, "Use this recipe").press()
+    save(page)
+    page.close()
+    (tmp_path / "work" / "people" / "ada.yaml").write_text("name: [Ada")
+    again = Page(FakeClient(), "work", Desk(tmp_path), PANELS)
+    assert again.work == page.work
+    assert any("ada.yaml** cannot be read" in str(getattr(one, "content", "")) for one in again.client.gui.made)
+    again.close()
