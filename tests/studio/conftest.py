@@ -90,7 +90,7 @@ def raw():
         page.close()
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="package")
 def chromium():
     """Headless Chromium, one for all tests."""
     command = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
@@ -131,7 +131,7 @@ def browser_page(chromium):
     assert not said, said
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="package")
 def shots(tmp_path_factory) -> Path:
     """Where screenshots go: the folder that FACEGEN_SHOTS names, or one that is forgotten."""
     named = os.environ.get("FACEGEN_SHOTS")

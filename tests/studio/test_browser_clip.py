@@ -25,7 +25,7 @@ def timeline(studio, browser_page):
 
 def test_two_faces_are_keyed_scrubbed_played_and_taken_away(studio, browser_page, tmp_path):
     page, one = timeline(studio, browser_page)
-    neutral = page.still()
+    neutral = page.face()
     page.drag_slider("Time (s)", 0.0)
     page.press("Key the face as it is now")
     page.until(lambda: one.work.clip.script)
@@ -57,7 +57,7 @@ def test_two_faces_are_keyed_scrubbed_played_and_taken_away(studio, browser_page
 
 def test_a_recording_is_opened_plays_on_any_face_and_is_there_after_a_reload(studio, browser_page, tmp_path):
     page, one = timeline(studio, browser_page)
-    neutral = page.still()
+    neutral = page.face()
     take = tmp_path / "take.csv"
     take.write_text("time,jawOpen,browInnerUp\n0,0,0\n1,1,1\n2,1,1\n")
     page.page.get_by_text("Recording", exact=True).click()

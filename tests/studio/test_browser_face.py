@@ -8,14 +8,10 @@ import re
 import numpy as np
 import pytest
 from PIL import Image
+from studio_page import difference
 
 import facegen
 from facegen.studio.face_panel import FacePanel
-
-
-def difference(one: np.ndarray, other: np.ndarray) -> float:
-    """Return the share of the picture that differs clearly."""
-    return float((np.abs(one.astype(int) - other.astype(int)).max(axis=2) > 24).mean())
 
 
 @pytest.fixture
@@ -25,7 +21,7 @@ def opened(studio, browser_page):
     page = browser_page(running.server)
     page.until(lambda: len(running.pages) == 1)
     one, = running.pages.values()
-    return page, one, page.still()
+    return page, one, page.face()
 
 
 def test_expressions_are_chosen_by_picture_mixed_and_undone(opened):

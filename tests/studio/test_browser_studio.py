@@ -2,21 +2,16 @@
 
 from __future__ import annotations
 
-import numpy as np
+from studio_page import difference
 
 from facegen.studio.work import FaceWork
-
-
-def difference(one: np.ndarray, other: np.ndarray) -> float:
-    """Return the share of the picture that differs clearly."""
-    return float((np.abs(one.astype(int) - other.astype(int)).max(axis=2) > 24).mean())
 
 
 def test_a_work_survives_a_reload_and_the_servers_end(studio, browser_page):
     first = studio()
     page = browser_page(first.server)
     page.until(lambda: len(first.pages) == 1)
-    neutral = page.still()
+    neutral = page.face()
     one, = first.pages.values()
     one.change("script", face=FaceWork(units={"27": 1.0, "L1": 1.0, "R1": 1.0}))
     assert one.stage.settle()
