@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
+from typing import TypeVar
 
 import numpy as np
 
@@ -18,6 +19,8 @@ from facegen.fileio.textfile import make_folder, whole_file
 from facegen.studio.limits import MEBIBYTE, Limits
 from facegen.studio.reading import read_avatar_safely
 from facegen.transfer.rig import avatar_files, avatar_names
+
+T = TypeVar("T")
 
 FOLDER = "avatar"
 """Folder of a work that holds what was opened there."""
@@ -81,23 +84,31 @@ def keep(folder: Path, name: str, content: bytes) -> str:
                          f"{LIMITS.file_bytes / MEBIBYTE:.0f}; leave out pictures and clothes, or use the command "
                          "facegen rig")
     place = make_folder(folder / FOLDER)
-    name = free(place, name, content)
-    with whole_file(place / name, "the avatar ") as draft:
+    return keep_read(place, name, content, lambda path: _check(read_avatar_safely(path, LIMITS), name), "the avatar ",
+                     _taken)[0]
+
+
+def keep_read(place: Path, name: str, content: bytes, read: Callable[[Path], T], what: str,
+              taken: Callable[[Path, str], bool] = lambda place, name: False) -> tuple[str, T]:
+    """Keep a file in a folder, under a name that is free, once ``read(path)`` took it; return that name and what was
+    read. What cannot be read is told by the name it came with, and leaves nothing."""
+    kept = _free(place, name, content, taken)
+    with whole_file(place / kept, what) as draft:
         trial = draft.with_suffix(Path(name).suffix)            # readers go by it
         try:
             trial.write_bytes(content)
             with called(trial, name):
-                _check(read_avatar_safely(trial, LIMITS), name)
+                found = read(trial)
             trial.replace(draft)
         finally:
             trial.unlink(missing_ok=True)
-    return name
+    return kept, found
 
 
-def free(place: Path, name: str, content: bytes) -> str:
-    """Return a name that is free in a folder, or that of the same file there."""
+def _free(place: Path, name: str, content: bytes, taken: Callable[[Path, str], bool]) -> str:
+    """Return a name that is free in a folder, or that of the same file there. taken: whether more forbids a name."""
     path, number = Path(name), 1
-    while _taken(place, name) or ((place / name).exists() and (place / name).read_bytes() != content):
+    while taken(place, name) or ((place / name).exists() and (place / name).read_bytes() != content):
         number += 1
         name = f"{path.stem}-{number}{path.suffix}"
     return name

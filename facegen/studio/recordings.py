@@ -16,7 +16,7 @@ from facegen.codec.decoder import Decoder
 from facegen.codec.link import read_stream
 from facegen.codec.recording import performance_of
 from facegen.errors import FileError, InputError
-from facegen.fileio.textfile import make_folder, whole_file
+from facegen.fileio.textfile import make_folder
 from facegen.studio import avatar_file
 from facegen.studio.limits import MEBIBYTE, Limits
 
@@ -53,18 +53,8 @@ def keep(folder: Path, name: str, content: bytes, work: ClipWork, *,
     if len(content) > LIMITS.file_bytes:
         raise InputError(f"file: '{name}' has {len(content) / MEBIBYTE:.0f} MB, the studio takes up to "
                          f"{LIMITS.file_bytes / MEBIBYTE:.0f}; cut it, or use the command facegen play")
-    place = make_folder(folder / FOLDER)
-    name = avatar_file.free(place, name, content)
-    with whole_file(place / name, "the recording ") as draft:
-        trial = draft.with_suffix(Path(name).suffix)            # readers go by it
-        try:
-            trial.write_bytes(content)
-            with avatar_file.called(trial, name):
-                found = (read or read_as)(trial, work)
-            trial.replace(draft)
-        finally:
-            trial.unlink(missing_ok=True)
-    return name, found
+    return avatar_file.keep_read(make_folder(folder / FOLDER), name, content,
+                                 lambda path: (read or read_as)(path, work), "the recording ")
 
 
 def load(folder: Path, work: ClipWork) -> Performance:

@@ -125,6 +125,10 @@ def test_a_recording_is_kept_only_if_it_can_be_read(tmp_path):
     with pytest.raises(facegen.FacegenError, match=r"my_take.csv: "):
         recordings.keep(tmp_path, "my take.csv", b"a,b\n1,2\n", ClipWork())
     assert (tmp_path / recordings.FOLDER / name).read_bytes() == good
+    assert recordings.keep(tmp_path, "my take.csv", good, ClipWork())[0] == name
+    assert recordings.keep(tmp_path, "my take.csv", good + b"\n", ClipWork())[0] == "my_take-2.csv"
+    assert (tmp_path / recordings.FOLDER / name).read_bytes() == good, "who undoes has the first again"
+    assert recordings.keep(tmp_path, "cat.csv", good, ClipWork())[0] == "cat.csv", "an avatar's name is no bar"
     for wrong in ("take.exe", "take", "..", "a/.csv/.."):
         with pytest.raises(InputError, match="expected a recording that ends in"):
             recordings.keep(tmp_path, wrong, good, ClipWork())
