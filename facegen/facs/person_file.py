@@ -11,7 +11,7 @@ from typing import Any
 
 from facegen.errors import FileError, InputError
 from facegen.facs.expression_table import Person, person_from_data
-from facegen.facs.yamlfile import parse_json, parse_yaml
+from facegen.facs.yamlfile import parse_bytes, parse_yaml
 from facegen.facs.yamltext import entry_lines, yaml_text
 from facegen.fileio.textfile import check_place, save_text
 
@@ -61,9 +61,9 @@ def person_change(data: Mapping[str, Any], path: str | os.PathLike[str]) -> Chan
     return Change(path, before, after, person_from_data(parse_yaml(after, str(path)), str(path), name=path.stem), kept)
 
 
-def read_person_data(text: str, name: str) -> dict[str, Any]:
-    """Return the plain data of a person's table, given its file's text and name; TableError if it is none."""
-    data = parse_json(text, name) if name.lower().endswith(".json") else parse_yaml(text, name)
+def read_person_data(content: bytes, name: str) -> dict[str, Any]:
+    """Return the plain data of a person's table, given its file's content and name; InputError if it is none."""
+    data = parse_bytes(content, name)
     person_from_data(data, name)
     return data
 

@@ -40,13 +40,18 @@ def read_data(path: str | Path) -> object:
     except (OSError, ValueError) as error:  # ValueError: a NUL in the path
         reason = "it is a folder" if path.is_dir() else error
         raise FileError(f"{path}: cannot be read ({reason})") from error
+    return parse_bytes(raw, str(path))
+
+
+def parse_bytes(raw: bytes, source: str) -> object:
+    """Return the data of a file's bytes: JSON if its name, ``source``, ends so, or YAML. Raises as `read_data`."""
     if len(raw) > MAX_BYTES:
-        raise FileError(f"{path}: larger than {MAX_BYTES // 1_000_000} MB, which no table or pose needs")
+        raise FileError(f"{source}: larger than {MAX_BYTES // 1_000_000} MB, which no table or pose needs")
     try:
         text = raw.decode("utf-8-sig")
     except UnicodeDecodeError as error:
-        raise FileError(f"{path}: not UTF-8 text (byte {error.start}); save it as UTF-8") from error
-    return parse_json(text, str(path)) if path.suffix.lower() == ".json" else parse_yaml(text, str(path))
+        raise FileError(f"{source}: not UTF-8 text (byte {error.start}); save it as UTF-8") from error
+    return parse_json(text, source) if source.lower().endswith(".json") else parse_yaml(text, source)
 
 
 def parse_json(text: str, source: str) -> object:

@@ -18,6 +18,7 @@ from facegen.studio.landmark_words import WORDS
 from facegen.studio.page import Page
 from facegen.studio.picking import as_landmarks, fits, point
 from facegen.studio.placement import box_placement
+from facegen.studio.stage import HALF_ANGLE
 from facegen.studio.work import AvatarWork
 from facegen.transfer.alignment import Similarity, align
 from facegen.transfer.landmark_checks import average_face
@@ -30,8 +31,7 @@ AVATAR = "avatar"
 BESIDE = np.array([300.0, 0.0, 0.0])
 """Where it stands, mm: beside the page's face."""
 
-# The camera's lens sees this share of its distance to each side; and some room round what is looked at.
-_HALF_ANGLE, _ROOM = np.tan(np.radians(14.0)), 1.1
+_ROOM = 1.1             # round what is looked at
 
 
 class AvatarScene:
@@ -129,5 +129,5 @@ class AvatarScene:
     def turn(self, middle: Array, half: tuple[float, float], view: tuple[float, float] = (0.0, 0.0)) -> None:
         """Turn the camera to a place, so far that half a width and a height, mm, are seen to each side of it."""
         wide = float(getattr(self.page.client.camera, "aspect", 1.0))
-        distance = _ROOM * max(half[0] / wide, half[1]) / _HALF_ANGLE
+        distance = _ROOM * max(half[0] / wide, half[1]) / HALF_ANGLE
         self.page.stage.look(middle, yaw=view[0], pitch=view[1], distance=distance)

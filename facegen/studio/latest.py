@@ -31,6 +31,12 @@ class Latest:
         with self._changed:
             return self._busy or self._wanted is not None
 
+    @property
+    def replaced(self) -> bool:
+        """Whether the job that runs is wanted no more: another waits, or all ends."""
+        with self._changed:
+            return self._closed or self._wanted is not None
+
     def settle(self, timeout: float = 10.0) -> bool:
         """Wait until nothing waits or runs; return whether that came about."""
         with self._changed:

@@ -13,7 +13,7 @@ from facegen.face.face import Face
 from facegen.face.reach import Grip
 from facegen.facs.deformation import Deformation, read_deformation
 from facegen.facs.expressions import resolve
-from facegen.facs.yamlfile import MAX_BYTES, parse_json, parse_yaml
+from facegen.facs.yamlfile import parse_bytes
 from facegen.facs.yamltext import yaml_text
 from facegen.studio import raw as raws
 from facegen.studio.page import FACE, Page
@@ -300,12 +300,5 @@ def _grip(face: Face, point: str) -> Grip:
 
 
 def read_raw(name: str, content: bytes) -> raws.Raw:
-    """Return the raw data of a deformation file's content; TableError or InputError names file and place."""
-    if len(content) > MAX_BYTES:
-        raise InputError(f"{name}: larger than {MAX_BYTES // 1_000_000} MB, which no pose needs")
-    try:
-        text = content.decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        raise InputError(f"{name}: not UTF-8 text (byte {error.start}); save it as UTF-8") from error
-    data = parse_json(text, name) if name.lower().endswith(".json") else parse_yaml(text, name)
-    return read_deformation(data, name)[0].as_dict()
+    """Return the raw data of a deformation file's content; FileError or TableError names file and place."""
+    return read_deformation(parse_bytes(content, name), name)[0].as_dict()

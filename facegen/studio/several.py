@@ -5,16 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-import numpy as np
-
 from facegen.studio.page import FACE, Page
+from facegen.studio.stage import DISTANCE, HALF_ANGLE
 
 APART = 235.0
 """Millimetres from middle to middle: heads of the base face's size, ears and hair included."""
-
-# Where the camera stands for one face, and what its lens of 28 degrees then sees.
-_DISTANCE = 700.0
-_WIDTH_SEEN = 2.0 * np.tan(np.radians(14.0))        # of a square picture, for each mm of distance
 
 
 class Several:
@@ -42,7 +37,7 @@ class Several:
             stage.put(_figure(name), rig.mesh(), colours=rig.colours, offset=self._offset(k))
         if not again:
             aspect = float(getattr(self.page.client.camera, "aspect", 1.0))
-            stage.look(distance=max(_DISTANCE, APART * len(rigs) / (_WIDTH_SEEN * aspect)))
+            stage.look(distance=max(DISTANCE, APART * len(rigs) / (2.0 * HALF_ANGLE * aspect)))
 
     def hide(self) -> None:
         """Have the page's own face back."""

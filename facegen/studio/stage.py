@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from facegen.geometry.mesh import Mesh
 from facegen.studio.figure import SCALE, Figure
+from facegen.studio.latest import Latest
 
 Array = NDArray[np.float64]
 Pose = Callable[[], Array]
@@ -23,10 +24,15 @@ Pose = Callable[[], Array]
 LEAST = 1 / 30
 """Seconds from picture to picture: a browser shows no more, and the wire is not filled."""
 
-# Where the camera stands, mm: in front, its lens that of a portrait.
-_DISTANCE, _LENS = 700.0, float(np.radians(28.0))
+DISTANCE = 700.0
+"""Millimetres from the middle of a face to the camera, in front of it."""
+
+_LENS = float(np.radians(28.0))         # that of a portrait
+HALF_ANGLE = float(np.tan(_LENS / 2.0))
+"""What the lens sees to each side of a square picture, for each mm of distance."""
+
 _MIDDLE = (0.0, -15.0, 0.0)
-_NEAR = 0.5             # of the scene: nearer would cost the depth its exactness, and the mouth would show on the cheek
+_NEAR = 0.5             # of the scene: nearer would cost the depth its exactness
 _BACKGROUND = 236
 
 
@@ -46,7 +52,7 @@ def set_scene(server: Any) -> None:
     camera.up, camera.position, camera.look_at, camera.fov, camera.near = (0.0, 1.0, 0.0), position, at, _LENS, _NEAR
 
 
-def _view(at: ArrayLike, yaw: float = 0.0, pitch: float = 0.0, distance: float = _DISTANCE
+def _view(at: ArrayLike, yaw: float = 0.0, pitch: float = 0.0, distance: float = DISTANCE
           ) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
     """Return where the camera stands and looks, in the scene."""
     yaw, pitch = np.radians(yaw), np.radians(pitch)
@@ -65,16 +71,14 @@ class Stage:
         self.client = client
         self.figures: dict[str, Figure] = {}
         self._fault = fault
+        self._latest = Latest("stage", fault)
         self._riders: dict[str, list[Callable[[Array], None]]] = {}
         self._wanted: dict[str, Pose] = {}
-        self._busy = False
-        self._changed = threading.Condition()
+        self._asking = threading.Lock()             # who changes what is wanted
         self._drawing = threading.RLock()           # who changes figures
-        self._closed = False
-        threading.Thread(target=self._run, name="facegen studio stage", daemon=True).start()
 
     def look(self, at: ArrayLike = _MIDDLE, *, yaw: float = 0.0, pitch: float = 0.0,
-             distance: float = _DISTANCE) -> None:
+             distance: float = DISTANCE) -> None:
         """Turn the camera to a place, mm, from an angle, degrees: yaw to the subject's left, pitch up."""
         position, middle = _view(at, yaw, pitch, distance)
         with self.client.atomic():
@@ -94,15 +98,16 @@ class Stage:
     def remove(self, name: str) -> None:
         """Take a figure away, if there is one."""
         with self._drawing:
-            self._wanted.pop(name, None)
+            with self._asking:
+                self._wanted.pop(name, None)
             if name in self.figures:
                 self.figures.pop(name).remove()
 
     def request(self, name: str, pose: Pose) -> None:
         """Have a figure show what ``pose() -> vertices (n, 3)`` gives, soon; the latest request wins."""
-        with self._changed:
+        with self._asking:
             self._wanted[name] = pose
-            self._changed.notify()
+        self._latest.ask(self._draw)
 
     def on_shown(self, name: str, call: Callable[[Array], None]) -> Callable[[], None]:
         """Have ``call(vertices)`` called after a figure was shown; return what stops it."""
@@ -112,27 +117,20 @@ class Stage:
 
     def settle(self, timeout: float = 10.0) -> bool:
         """Wait until nothing is asked for that is not shown; return whether that came about."""
-        with self._changed:
-            return self._changed.wait_for(lambda: self._closed or not (self._wanted or self._busy), timeout)
+        return self._latest.settle(timeout)
 
     def close(self) -> None:
         """End its thread."""
-        with self._changed:
-            self._closed = True
-            self._changed.notify_all()
+        self._latest.close()
 
-    def _run(self) -> None:
-        while True:
-            with self._changed:
-                self._busy = False
-                self._changed.notify_all()
-                self._changed.wait_for(lambda: self._wanted or self._closed)
-                if self._closed:
-                    return
-                wanted, self._wanted, self._busy = self._wanted, {}, True
-            begun = time.monotonic()
-            for name, pose in wanted.items():
-                self._show(name, pose)
+    def _draw(self) -> None:
+        """Show all that is wanted."""
+        with self._asking:
+            wanted, self._wanted = self._wanted, {}
+        begun = time.monotonic()
+        for name, pose in wanted.items():
+            self._show(name, pose)
+        if wanted:
             time.sleep(max(LEAST - (time.monotonic() - begun), 0.0))
 
     def _show(self, name: str, pose: Pose) -> None:

@@ -11,8 +11,8 @@ import hashlib
 import io
 import itertools
 import os
-import threading
 from collections.abc import Callable, Mapping
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +24,7 @@ from facegen.facs.notation import canonical
 from facegen.fileio.textfile import make_folder, whole_file
 from facegen.geometry.camera import Camera, frame
 from facegen.render.dress import portrait
+from facegen.studio.latest import Latest
 
 SIZE = 88
 """Pixels of a thumbnail: four stand beside each other in a panel, sharp on a fine screen too."""
@@ -62,50 +63,25 @@ class Thumbnails:
     """Pictures below a folder. `ask` for them; a thread draws the latest asked for."""
 
     def __init__(self, folder: str | os.PathLike[str], fault: Callable[[Exception], None]) -> None:
-        self._folder, self._fault = Path(folder), fault
-        self._changed = threading.Condition()
-        self._asked: tuple[Any, list[tuple[str, Mapping[str, float]]], Callable[[str, str], None]] | None = None
-        self._closed = self._busy = False
-        self._thread: threading.Thread | None = None
+        self._folder = Path(folder)
+        self._latest = Latest("thumbnails", fault)
 
     def ask(self, rig: Any, wanted: Mapping[str, Mapping[str, float]], ready: Callable[[str, str], None]) -> None:
         """Have ``ready(name, data_url)`` called for every name -> units, in order; what was asked before is dropped."""
-        with self._changed:
-            self._asked = rig, list(wanted.items()), ready
-            self._changed.notify_all()
-            if self._thread is None:
-                self._thread = threading.Thread(target=self._run, name="facegen studio thumbnails", daemon=True)
-                self._thread.start()
+        self._latest.ask(partial(self._draw, rig, list(wanted.items()), ready))
 
     def settle(self, timeout: float = 60.0) -> bool:
         """Wait until all that was asked for is there."""
-        with self._changed:
-            return self._changed.wait_for(lambda: self._closed or not (self._asked or self._busy), timeout)
+        return self._latest.settle(timeout)
 
     def close(self) -> None:
         """End its thread."""
-        with self._changed:
-            self._closed = True
-            self._changed.notify_all()
-
-    def _run(self) -> None:
-        while True:
-            with self._changed:
-                self._busy = False
-                self._changed.notify_all()
-                self._changed.wait_for(lambda: self._asked or self._closed)
-                if self._closed:
-                    return
-                (rig, wanted, ready), self._asked, self._busy = self._asked, None, True
-            try:
-                self._draw(rig, wanted, ready)
-            except Exception as error:
-                self._fault(error)
+        self._latest.close()
 
     def _draw(self, rig: Any, wanted: list[tuple[str, Mapping[str, float]]], ready: Callable[[str, str], None]) -> None:
         folder, renderer = self._folder / face_digest(rig), None
         for name, units in wanted:
-            if self._closed or self._asked:
+            if self._latest.replaced:
                 return
             script = canonical(units)
             path = folder / f"{hashlib.sha256(script.encode()).hexdigest()[:24]}.jpg"

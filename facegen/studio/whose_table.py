@@ -9,7 +9,7 @@ from facegen.data import tables_dir
 from facegen.errors import FacegenError, InputError
 from facegen.facs.expression_table import people
 from facegen.facs.person_file import Change, person_change, read_person_data
-from facegen.facs.yamlfile import MAX_BYTES, read_data
+from facegen.facs.yamlfile import read_data
 from facegen.fileio.textfile import make_folder
 from facegen.studio import table_edit as edit
 from facegen.studio.page import Page
@@ -91,12 +91,7 @@ class WhoseTable:
 
     def _uploaded(self) -> None:
         file = self._upload.value
-        if len(file.content) > MAX_BYTES:
-            raise InputError(f"{file.name}: larger than {MAX_BYTES // 1_000_000} MB, which no table needs")
-        try:
-            data = read_person_data(file.content.decode("utf-8-sig"), file.name)
-        except UnicodeDecodeError as error:
-            raise InputError(f"{file.name}: not UTF-8 text (byte {error.start}); save it as UTF-8") from error
+        data = read_person_data(file.content, file.name)
         stem = file.name.rpartition(".")[0] or file.name
         self._put(f"open {file.name}", TableWork(edit.file_name(stem), {"name": stem, **data}))
         self.page.say("It is kept here when you save it.", f"{file.name} is open")

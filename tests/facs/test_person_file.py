@@ -144,7 +144,7 @@ def test_a_file_that_changed_meanwhile_is_not_overwritten(tmp_path):
 def test_shipped_people_can_be_read_and_changed():
     for path in (tables_dir() / "people").glob("*.yaml"):
         text = path.read_text()
-        new = {**read_person_data(text, path.name), "units": {"12": {"scale": 0.5}}}
+        new = {**read_person_data(text.encode(), path.name), "units": {"12": {"scale": 0.5}}}
         changed, kept = changed_text(text, new)
         assert kept
         assert changed.startswith(text)
