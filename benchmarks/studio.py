@@ -35,7 +35,8 @@ class Wire:
         self.came: list[tuple[float, int]] = []         # when, bytes of vertices
         self.sliders: dict[str, str] = {}
         self._end = threading.Event()
-        threading.Thread(target=self._read, daemon=True).start()
+        self._reader = threading.Thread(target=self._read, daemon=True)
+        self._reader.start()
 
     def _read(self) -> None:
         while not self._end.is_set():
@@ -57,6 +58,7 @@ class Wire:
 
     def close(self) -> None:
         self._end.set()
+        self._reader.join()
         self.page.close()
 
 

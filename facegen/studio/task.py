@@ -9,6 +9,11 @@ from typing import Any
 from facegen.studio.page import Page
 
 
+# Seconds until what is hidden is removed: viser's page puts updates last in a frame, and tells of an error where one
+# comes for what the same frame has removed. A frame takes a busy machine a second.
+_LINGERS = 3.0
+
+
 class Stopped(Exception):
     """Raised inside a job whose person pressed stop."""
 
@@ -62,7 +67,11 @@ class Task:
         except Exception as error:
             self._page.fault(error)
         finally:
-            for part in (self._bar, self._text, self._button):
-                part.remove()
+            parts = self._bar, self._text, self._button
+            for part in parts:
+                part.visible = False
             with self._page.lock:
                 self._ended()
+            later = threading.Timer(_LINGERS, lambda: [part.remove() for part in parts])
+            later.daemon = True
+            later.start()

@@ -100,8 +100,11 @@ class Maker:
         return made
 
     def find(self, label: str) -> Handle:
-        """Return the one handle of a label that is not removed."""
-        found, = (one for one in self.made if str(getattr(one, "label", None)) == label and not one.removed)
+        """Return the one handle of a label that is not removed; where there are several, the one that is seen."""
+        found = [one for one in self.made if str(getattr(one, "label", None)) == label and not one.removed]
+        if len(found) > 1:
+            found = [one for one in found if one.visible]
+        found, = found
         return found
 
 

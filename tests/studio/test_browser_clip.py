@@ -2,15 +2,10 @@
 
 from __future__ import annotations
 
-import numpy as np
+from studio_page import difference
 
 import facegen
 from facegen.studio.work import FaceWork
-
-
-def moved(one: np.ndarray, other: np.ndarray) -> float:
-    """Return the share of the picture that differs clearly."""
-    return float((np.abs(one.astype(int) - other.astype(int)).max(axis=2) > 24).mean())
 
 
 def timeline(studio, browser_page):
@@ -34,17 +29,17 @@ def test_two_faces_are_keyed_scrubbed_played_and_taken_away(studio, browser_page
     page.press("Key the face as it is now")
     page.until(lambda: len(one.work.clip.script["keyframes"]) == 2)
     wide = page.changed(neutral)
-    assert moved(wide, neutral) > 0.01
+    assert difference(wide, neutral) > 0.01
     page.drag_slider("Time (s)", 0.5)
     half = page.changed(wide)
-    assert moved(half, wide) > 0.002
-    assert moved(half, neutral) > 0.002
+    assert difference(half, wide) > 0.002
+    assert difference(half, neutral) > 0.002
     page.drag_slider("Time (s)", 0.0)
     # The browser shades a mesh that has moved a little otherwise than one that never did.
-    rest = 0.5 * moved(half, neutral)
-    page.until(lambda: moved(page.pixels(), neutral) < rest)
+    rest = 0.5 * difference(half, neutral)
+    page.until(lambda: difference(page.pixels(), neutral) < rest)
     page.press("Play")
-    page.until(lambda: moved(page.pixels(), neutral) > rest)
+    page.until(lambda: difference(page.pixels(), neutral) > rest)
     page.until(lambda: page.value("Time (s)") > 0.5)
     page.press("Pause")
     page.page.get_by_text("Save as").click()
@@ -65,11 +60,11 @@ def test_a_recording_is_opened_plays_on_any_face_and_is_there_after_a_reload(stu
     page.until(lambda: one.work.clip.recording == "take.csv")
     page.drag_slider("Time (s)", 1.0)
     opened = page.changed(neutral)
-    assert moved(opened, neutral) > 0.005
+    assert difference(opened, neutral) > 0.005
     page.reload()
     page.tab("Timeline")
     page.page.get_by_text("Recording", exact=True).click()
     page.says("take.csv")
     page.until(lambda: not page.button("Play").is_disabled())
     page.drag_slider("Time (s)", 1.0)
-    page.until(lambda: moved(page.pixels(), opened) < 0.002)
+    page.until(lambda: difference(page.pixels(), opened) < 0.002)

@@ -2,6 +2,7 @@
 
 import json
 import threading
+import time
 
 import pytest
 from fake_client import FakeClient
@@ -120,12 +121,18 @@ def test_two_pages_keep_apart(desk):
     two.close()
 
 
-def test_a_task_says_how_far_it_is_gives_its_result_and_tidies_up(desk):
+def test_a_task_says_how_far_it_is_gives_its_result_and_tidies_up(desk, monkeypatch):
+    monkeypatch.setattr("facegen.studio.task._LINGERS", 0.1)
     page, got = opened(desk), []
     task = Task(page, "Count", lambda report: [report(f"{k}", k / 3) for k in range(3)] and 42, got.append)
     assert task.wait(10)
     assert got == [42]
-    assert all(one.removed for one in page.client.gui.made if one.kind in ("progress_bar", "button"))
+    parts = [one for one in page.client.gui.made if one.kind in ("progress_bar", "button")]
+    assert not any(one.visible for one in parts)
+    until = time.monotonic() + 10.0
+    while not all(one.removed for one in parts) and time.monotonic() < until:
+        time.sleep(0.02)
+    assert all(one.removed for one in parts)
     page.close()
 
 
