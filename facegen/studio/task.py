@@ -8,7 +8,6 @@ from typing import Any
 
 from facegen.studio.page import Page
 
-
 # Seconds until what is hidden is removed: viser's page puts updates last in a frame, and tells of an error where one
 # comes for what the same frame has removed. A frame takes a busy machine a second.
 _LINGERS = 3.0
