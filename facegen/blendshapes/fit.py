@@ -13,7 +13,6 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import lsq_linear, nnls
 
 ENOUGH = 5e-3
 """A shape that takes less than this share of the movement's square off the residual's is left out."""
@@ -90,6 +89,8 @@ class Fit:
 
 def _bounded(parts: NDArray[np.float64], goal: NDArray[np.float64], upper: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the least-squares weights (k,) in 0..upper (k,) of parts (r, k)."""
+    from scipy.optimize import lsq_linear, nnls  # here: most commands fit nothing, and it takes a fifth of a second
+
     found = nnls(parts, goal)[0]
     if (found > upper).any():
         found = np.clip(lsq_linear(parts, goal, (0.0, upper), method="bvls").x, 0.0, upper)

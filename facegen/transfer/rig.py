@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cache, lru_cache
+from functools import cache
 from pathlib import Path
 
 import numpy as np
 
-from facegen.blendshapes.recipes import Recipe, shape_sets
+from facegen.blendshapes.recipes import shape_sets
 from facegen.data import meshes_dir
 from facegen.errors import FileError, InputError, nearest
 from facegen.face.face import load_face
 from facegen.fileio.avatar import AvatarFile, check_output, load_avatar, save_avatar
 from facegen.fileio.kept import kept_in
+from facegen.forked import Aside
 from facegen.progress import Progress, silent, within
 from facegen.transfer.choices import Choices
 from facegen.transfer.halfway import half_name
@@ -113,7 +114,10 @@ class Rigging:
         avatar, landmarks: as in `rig`, or what `load_avatar` and `snap` gave. Everything else as in `rig`.
         """
         self._asked = asked = _asked(sets, shapes, person, template, template_landmarks)
-        self.source, self.places, odd = _read(avatar, landmarks)
+        with Aside(asked.make, useful=not _last.made_of(asked.of)) as template:
+            self.source, self.places, odd = _read(avatar, landmarks)
+            if template.forked:
+                _last.template(asked.of, template.result)
         self.warnings = (*odd, *_without_expressions(self.source, asked.sets))
         self._pieces, self._cache = pieces, cache
         self._binding: Binding | None = None
@@ -157,7 +161,8 @@ class Rigging:
                                  f"{nearest(str(name), self.names)}")
         if self._binding is None:
             progress("making the shapes of the template", 0.0)
-            self._binding = Binding(self.source.mesh, self.places, self._asked.template(), pieces=self._pieces,
+            template = _last.template(self._asked.of, self._asked.make)
+            self._binding = Binding(self.source.mesh, self.places, template, pieces=self._pieces,
                                     kept=kept_in("registrations") if self._cache else None,
                                     progress=within(progress, 0.1, 0.4))
             progress = within(progress, 0.4, 1.0)
@@ -196,10 +201,12 @@ def rig(avatar: str | Path, output: str | Path, *, landmarks: str | Path | None 
 
 @dataclass(frozen=True)
 class _Asked:
-    """What is to be made. ``sets``: shape -> the vocabulary it belongs to, empty if unknown; ``template``: makes it."""
+    """What is to be made. ``sets``: shape -> the vocabulary it belongs to, empty if unknown; ``make``: makes the
+    template, ``of`` this."""
 
     sets: Mapping[str, str]
-    template: Callable[[], Template]
+    of: Hashable
+    make: Callable[[], Template]
 
 
 def _asked(sets: Sequence[str] | None, shapes: Sequence[str] | None, person: str | Path | None,
@@ -211,7 +218,7 @@ def _asked(sets: Sequence[str] | None, shapes: Sequence[str] | None, person: str
                              "template, whose shapes go by its own names; leave it out, and choose among them by name "
                              "(shapes)")
         file = read_template(template, landmarks=template_landmarks, shapes=shapes)
-        return _Asked({name: file.sets.get(name, "") for name in file.shapes}, file.template)
+        return _Asked({name: file.sets.get(name, "") for name in file.shapes}, file, file.template)
     if template_landmarks is not None:
         raise InputError("template_landmarks: expected a template that they are on, got none (--template)")
     recipes = shape_sets(DEFAULT_SETS if sets is None else sets, person)
@@ -225,12 +232,27 @@ def _asked(sets: Sequence[str] | None, shapes: Sequence[str] | None, person: str
     # A corrective is made from the shape that it corrects, whether or not that is asked for.
     needed = {*wanted, *(recipes[name].minus for name in wanted)}
     of = tuple((name, recipe) for name, recipe in recipes.items() if name in needed)
-    return _Asked({name: recipes[name].set for name in wanted}, lambda: _template(of))
+    return _Asked({name: recipes[name].set for name in wanted}, of, lambda: template_of(load_face(), dict(of)))
 
 
-@lru_cache(maxsize=1)         # many avatars with the same shapes; a template is tens of megabytes
-def _template(recipes: tuple[tuple[str, Recipe], ...]) -> Template:
-    return template_of(load_face(), dict(recipes))
+class _Last:
+    """The template that was made last: many avatars get the same shapes, and a template is tens of megabytes."""
+
+    def __init__(self) -> None:
+        self._kept: tuple[Hashable, Template] | None = None
+
+    def made_of(self, of: Hashable) -> bool:
+        return self._kept is not None and self._kept[0] == of
+
+    def template(self, of: Hashable, make: Callable[[], Template]) -> Template:
+        """Return it if it was made of this; else make it, and keep it instead."""
+        kept = self._kept
+        if kept is None or kept[0] != of:
+            self._kept = kept = of, make()
+        return kept[1]
+
+
+_last = _Last()
 
 
 def _without_expressions(source: AvatarFile, sets: Mapping[str, str]) -> list[str]:
