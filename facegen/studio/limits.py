@@ -14,8 +14,9 @@ class Limits:
     pages: pages open at once. works: different works seen by one server. message_bytes: one message of a page; an
     upload comes in parts of half a mebibyte. file_bytes: one uploaded file; data_bytes: one of YAML or JSON. uploads,
     upload_bytes: uploads of one page under way. messages: messages a second of one page, more are slowed. text:
-    characters of one text of a page. triangles: of an opened avatar. read_seconds, read_bytes: what reading one may
-    take.
+    characters of one text of a page. triangles: of an opened avatar. recorded_seconds, frames, numbers: of an opened
+    recording, as long as it lasts and as much as it holds. read_seconds, read_bytes: what reading an avatar or a
+    recording may take.
     """
 
     pages: int = 16
@@ -28,5 +29,8 @@ class Limits:
     messages: float = 240.0
     text: int = 200_000
     triangles: int = 400_000
+    recorded_seconds: float = 6 * 3600.0
+    frames: int = 500_000
+    numbers: int = 30_000_000
     read_seconds: float = 60.0
     read_bytes: int = 2048 * MEBIBYTE

@@ -99,7 +99,7 @@ class RigMaker:
             marks = make_folder(self.folder / FOLDER) / f"{opened.output}.landmarks.yaml"
             save_text(file_text(work, opened.avatar.digest), marks)
             try:
-                made = Rigging(opened.path, landmarks=marks, sets=set_names(work.sets), pieces=dict(work.pieces))
+                made = Rigging(opened.avatar, landmarks=marks, sets=set_names(work.sets), pieces=dict(work.pieces))
             except InputError as error:             # of a file that the person never sees
                 raise InputError(words_for(str(error).removeprefix(f"{marks}: "))) from None
             self._laid = now, made

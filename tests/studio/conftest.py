@@ -40,6 +40,14 @@ def viser():
 
 
 @pytest.fixture
+def read_here(monkeypatch):
+    """What strangers sent is read in this process: test_reading.py has the other, that takes a second each."""
+    from facegen.studio import reading
+
+    monkeypatch.setattr(reading, "ask", lambda job, path, limits, wish, waits=None: reading.JOBS[job](path, wish))
+
+
+@pytest.fixture
 def serve(viser, tmp_path, monkeypatch):
     """A function that starts a server on a free port, in a folder of its own, and stops it after the test.
 

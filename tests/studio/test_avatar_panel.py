@@ -21,6 +21,8 @@ from facegen.studio.picking import as_places, point
 from facegen.transfer.landmarks import load_landmarks
 from facegen.transfer.rig import avatar_files
 
+pytestmark = pytest.mark.usefixtures("read_here")
+
 NAME = "work-of-one"
 
 

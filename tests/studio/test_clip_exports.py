@@ -18,6 +18,8 @@ from facegen.studio import recordings, script_text, timeline
 from facegen.studio.exports import FORMS, Wish, export, form_of
 from facegen.studio.work import ClipWork
 
+pytestmark = pytest.mark.usefixtures("read_here")
+
 SCRIPT = {"duration": 1.0, "keyframes": [{"t": 0.0, "pose": "0"}, {"t": 0.8, "pose": "6C+12D"}]}
 CLIP = timeline.read(SCRIPT)
 WISH = Wish("akimoto-1986", (48, 48), 5.0)
