@@ -17,7 +17,7 @@ from facegen.fileio.gltf_read import GltfScene
 from facegen.fileio.obj import ObjFile
 from facegen.fileio.textfile import make_folder, whole_file
 from facegen.studio.apart import Waits, patient
-from facegen.studio.limits import MEBIBYTE, Limits
+from facegen.studio.limits import LIMITS, MEBIBYTE
 from facegen.studio.reading import read_avatar_safely
 from facegen.studio.recent import Recent
 from facegen.transfer.rig import avatar_files, avatar_names
@@ -28,9 +28,6 @@ FOLDER = "avatar"
 """Folder of a work that holds what was opened there."""
 
 TAKEN = (".obj", ".glb", ".vrm", ".ply", ".stl", ".gltf")
-
-LIMITS = Limits()
-"""What is taken at most. An avatar for games has a tenth of the triangles."""
 
 COLOURS = ".mtl"
 """What the name of an OBJ file's colours ends in."""

@@ -13,7 +13,7 @@ from facegen.animation.performance import Performance
 from facegen.errors import FileError, InputError
 from facegen.fileio.avatar import READABLE, AvatarFile, load_avatar
 from facegen.studio.apart import Waits, Wish, ask, patient
-from facegen.studio.limits import Limits
+from facegen.studio.limits import LIMITS, Limits
 
 STREAM = ".fgp"
 """What the name of a recording in facegen's few bits ends in."""
@@ -21,29 +21,45 @@ STREAM = ".fgp"
 _WAIT = 16              # packets that a missing one is waited for, as the command does
 
 
-def read_avatar_safely(path: str | os.PathLike[str], limits: Limits | None = None, waits: Waits = patient
+def read_avatar_safely(path: str | os.PathLike[str], limits: Limits = LIMITS, waits: Waits = patient
                        ) -> AvatarFile:
     """Return what `facegen.load_avatar` returns, read by another process with bounds on its time and memory.
 
     waits: see `facegen.studio.apart.ask`. Raises FileError for a file that is wrong, has more triangles than
     ``limits.triangles``, takes too long or too much.
     """
-    path, limits = Path(path), limits or Limits()
+    path = Path(path)
     if path.suffix.lower() not in READABLE:
         return load_avatar(path)        # which says what it reads
     return ask("avatar", path, limits, {"triangles": limits.triangles}, waits)
 
 
 def read_recording_safely(path: Path, limits: Limits, *, fps: float | None = None, person: str | None = None,
+                          calibrate: str = "", calibrate_head: bool = False, smooth: str = "",
                           waits: Waits = patient) -> Performance:
     """Return what `facegen.load_performance` returns, or a stream's performance, read by another process.
 
-    waits: see `facegen.studio.apart.ask`. Raises FileError or InputError for a file that is wrong, lasts longer or
-    holds more than ``limits`` say, takes too long or too much.
+    calibrate, calibrate_head, smooth: see `cleaned`. waits: see `facegen.studio.apart.ask`. Raises FileError or
+    InputError for a file that is wrong, lasts longer or holds more than ``limits`` say, takes too long or too much.
     """
     wish = {"fps": fps, "person": person, "seconds": limits.recorded_seconds, "frames": limits.frames,
-            "numbers": limits.numbers}
+            "numbers": limits.numbers,
+            "clean": {"calibrate": calibrate, "calibrate_head": calibrate_head, "smooth": smooth}}
     return ask("recording", path, limits, wish, waits)
+
+
+def cleaned(plain: Performance, *, calibrate: str = "", calibrate_head: bool = False, smooth: str = "") -> Performance:
+    """Return a recording less its resting face and smoothed, as `facegen.studio.work.ClipWork` says; "" for not.
+
+    InputError.
+    """
+    from facegen.animation.streams.calibrate import calibrated, parse_calibration
+    from facegen.animation.streams.smooth import OneEuro, smoothed
+
+    if calibrate:
+        plain = calibrated(plain, parse_calibration(calibrate, head=calibrate_head))
+    euro = OneEuro.of(smooth or None)
+    return plain if euro is None else smoothed(plain, euro)
 
 
 # In the other process
@@ -77,7 +93,7 @@ def _recording(path: Path, wish: Wish) -> Performance:
              sum(one.size for one in columns), wish["numbers"])):
         if has > most:
             raise InputError(f"{path}: {said}; cut it, or use the command facegen play")
-    return found
+    return cleaned(found, **wish["clean"])
 
 
 def _performance(path: Path, fps: float | None, person: str | None) -> Performance:

@@ -6,15 +6,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from facegen.animation.performance import Performance
-from facegen.animation.streams.calibrate import calibrated, parse_calibration
 from facegen.animation.streams.files import FORMATS
-from facegen.animation.streams.smooth import OneEuro, smoothed
 from facegen.errors import FileError, InputError
 from facegen.fileio.textfile import make_folder
 from facegen.studio import avatar_file
 from facegen.studio.apart import Waits, patient
-from facegen.studio.limits import MEBIBYTE, Limits
-from facegen.studio.reading import STREAM, read_recording_safely
+from facegen.studio.limits import LIMITS, MEBIBYTE
+from facegen.studio.reading import STREAM, cleaned, read_recording_safely
 from facegen.studio.recent import Recent
 
 if TYPE_CHECKING:
@@ -26,8 +24,7 @@ FOLDER = "recording"
 TAKEN = (*dict.fromkeys(end for one in FORMATS.values() if one.read is not None for end in one.suffixes), STREAM)
 """What the names of recordings end in."""
 
-LIMITS = Limits()
-
+_QUICK = 5000           # frames that are smoothed in half a second
 # Performances in memory: those of a few steps of undo.
 _recent: Recent[Performance] = Recent(4)
 
@@ -50,7 +47,7 @@ def keep(folder: Path, name: str, content: bytes, work: ClipWork, waits: Waits =
     place = make_folder(folder / FOLDER)
     kept, plain = avatar_file.keep_read(place, name, content, lambda path: _read(path, work, waits), "the recording ")
     _recent.put(_key(place / kept, work), plain)
-    return kept, _finished(plain, work)
+    return kept, _finished(place / kept, plain, work, waits)
 
 
 def load(folder: Path, work: ClipWork, waits: Waits = patient) -> Performance:
@@ -59,22 +56,27 @@ def load(folder: Path, work: ClipWork, waits: Waits = patient) -> Performance:
     if not path.is_file():
         raise FileError(f"recording: '{work.recording}' is no longer in the folder of this work; open it again")
     with avatar_file.called(path, path.name):
-        return _finished(_recent.get(_key(path, work), lambda: _read(path, work, waits)), work)
+        plain = _recent.get(_key(path, work), lambda: _read(path, work, waits))
+        return _finished(path, plain, work, waits)
 
 
 def _key(path: Path, work: ClipWork) -> tuple[Any, ...]:
     return path, path.stat().st_mtime_ns, work.recorded_fps, work.face_id
 
 
-def _read(path: Path, work: ClipWork, waits: Waits) -> Performance:
-    return read_recording_safely(path, LIMITS, fps=work.recorded_fps or None, person=work.face_id or None, waits=waits)
+def _read(path: Path, work: ClipWork, waits: Waits, **clean: Any) -> Performance:
+    return read_recording_safely(path, LIMITS, fps=work.recorded_fps or None, person=work.face_id or None, waits=waits,
+                                 **clean)
 
 
-def _finished(plain: Performance, work: ClipWork) -> Performance:
-    if work.calibrate:
-        plain = calibrated(plain, parse_calibration(work.calibrate, head=work.calibrate_head))
-    euro = OneEuro.of(work.smooth or None)
-    return plain if euro is None else smoothed(plain, euro)
+def _finished(path: Path, plain: Performance, work: ClipWork, waits: Waits) -> Performance:
+    """Return a recording cleaned up as a work says: a long one by the other process, which can be stopped."""
+    how = {"calibrate": work.calibrate, "calibrate_head": work.calibrate_head, "smooth": work.smooth}
+    if len(plain) <= _QUICK:
+        return cleaned(plain, **how)
+    if not (work.calibrate or work.smooth):
+        return plain
+    return _recent.get((*_key(path, work), *how.values()), lambda: _read(path, work, waits, **how))
 
 
 def about(one: Performance) -> dict[str, Any]:

@@ -19,9 +19,11 @@ from facegen.facs.deformation import Deformation, deformation_from_dict, weighte
 from facegen.facs.expression_table import HABITS, Person, person_from_data
 from facegen.facs.expressions import Resolution, resolve
 from facegen.facs.notation import canonical
+from facegen.facs.person_file import check_count
 from facegen.facs.tables import load_units
 from facegen.facs.validate import Entry
 from facegen.studio.avatar_checks import check_avatar
+from facegen.studio.limits import LIMITS
 from facegen.studio.recordings import safe_name
 from facegen.studio.timeline import check_form
 
@@ -194,6 +196,7 @@ class TableWork:
 
     def checked(self) -> Self:
         """Return itself, or raise InputError."""
+        check_count(self.data, LIMITS.habits, self.file or "table")
         load_units().own_basis(self.person)
         return self
 

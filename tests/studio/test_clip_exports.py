@@ -16,6 +16,7 @@ from facegen.errors import InputError
 from facegen.fileio.sound import read_wav
 from facegen.studio import recordings, script_text, timeline
 from facegen.studio.exports import FORMS, Wish, export, form_of
+from facegen.studio.limits import Limits
 from facegen.studio.work import ClipWork
 
 pytestmark = pytest.mark.usefixtures("read_here")
@@ -139,8 +140,27 @@ def test_a_recording_is_kept_only_if_it_can_be_read(tmp_path):
         recordings.load(tmp_path, ClipWork(recording=name))
 
 
+def test_a_long_recording_is_cleaned_where_it_is_read(tmp_path, monkeypatch):
+    """It takes seconds, and nobody could stop it here; what comes of it is the same."""
+    from facegen.studio import reading
+
+    text = "time,jawOpen\n" + "".join(f"{k / 10},{0.2 + 0.5 * (k % 3)}\n" for k in range(30))
+    name, plain = recordings.keep(tmp_path, "take.csv", text.encode(), ClipWork())
+    work = ClipWork(recording=name, calibrate="0-1", smooth="on")
+    here = recordings.load(tmp_path, work)
+    monkeypatch.setattr(recordings, "_QUICK", 10)
+    monkeypatch.setattr(recordings, "cleaned", lambda *_, **__: pytest.fail("it was cleaned here"))
+    asked = []
+    ask = reading.ask
+    monkeypatch.setattr(reading, "ask", lambda *args: asked.append(args[0]) or ask(*args))
+    for _ in range(2):
+        np.testing.assert_array_equal(recordings.load(tmp_path, work).weights, here.weights)
+    assert np.abs(here.weights - plain.weights).max() > 0.1
+    assert asked == ["recording"]
+
+
 def test_too_large_a_recording_is_refused(tmp_path, monkeypatch):
-    monkeypatch.setattr(recordings, "LIMITS", recordings.Limits(file_bytes=100))
+    monkeypatch.setattr(recordings, "LIMITS", Limits(file_bytes=100))
     with pytest.raises(InputError, match="the studio takes up to"):
         recordings.keep(tmp_path, "take.csv", b"x" * 101, ClipWork())
     assert not Path(tmp_path / recordings.FOLDER).exists()

@@ -27,7 +27,7 @@ from facegen.transfer.rig import avatar_files, avatar_names
 LIMITS = Limits(read_seconds=20.0, read_bytes=1 << 30)
 AVATAR = {"triangles": LIMITS.triangles}
 RECORDING = {"fps": None, "person": None, "seconds": LIMITS.recorded_seconds, "frames": LIMITS.frames,
-             "numbers": LIMITS.numbers}
+             "numbers": LIMITS.numbers, "clean": {}}
 
 
 def _glb(scene: dict, binary: bytes = b"", *, length: int | None = None) -> bytes:

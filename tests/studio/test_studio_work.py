@@ -13,7 +13,7 @@ from facegen.errors import FileError, InputError, TableError
 from facegen.facs.tables import load_units
 from facegen.studio.history import STEPS, TOGETHER, History
 from facegen.studio.store import Store
-from facegen.studio.work import FaceWork, Work
+from facegen.studio.work import FaceWork, TableWork, Work
 
 weights = st.floats(0.0, 1.0, allow_subnormal=False)
 
@@ -170,3 +170,9 @@ def test_a_gaze_takes_the_place_of_units_that_turn_the_eyes(script):
     both, alone = (FaceWork(units=one, gaze=gaze).checked().meaning(rig=face) for one in (units, others))
     assert face.pose(both) == pytest.approx(face.pose(alone), abs=1e-9)
     assert not any(load_units().basis[name].eyes for name in load_units().coefficients(both.units))
+
+
+def test_a_table_of_too_many_habits_is_refused():
+    data = {"about": "a", "source": "b", "aliases": dict.fromkeys([f"w{k}" for k in range(2000)], "happiness")}
+    with pytest.raises(InputError, match="has 2,000 habits"):
+        TableWork("ada.yaml", data).checked()
