@@ -145,7 +145,7 @@ def keep_colours(folder: Path, opened: Opened, name: str, content: bytes) -> Non
         raise InputError(f"file: '{base}' is too large for a list of colours")
     with whole_file(folder / FOLDER / base, "the colours ") as draft:
         draft.write_bytes(content)
-    _recent.forget(lambda key: key == _key(opened.path))
+    _recent.forget(_key(opened.path))
 
 
 def lost_colours(opened: Opened) -> str | None:

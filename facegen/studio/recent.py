@@ -1,4 +1,4 @@
-"""What was loaded lately, kept: the least recently used gives way."""
+"""What was loaded lately, kept: the least recently used gives way, what somebody still has is found all the same."""
 
 from __future__ import annotations
 
@@ -11,50 +11,37 @@ T = TypeVar("T")
 
 
 class Recent(Generic[T]):
-    """So many things at most, by a key. Safe to call from several threads; none is made twice at the same time.
+    """Things by a key: the latest used, so many at most, and each that somebody else still holds, so that nothing is
+    there twice. Safe to call from several threads; nothing is made twice at the same time."""
 
-    held: says of a key whether it is in use and stays however many there are.
-    """
-
-    def __init__(self, most: int, held: Callable[[Hashable], bool] = lambda key: False) -> None:
-        self._most, self._held = most, held
+    def __init__(self, most: int) -> None:
+        self._most = most
         self._kept: dict[Hashable, T] = {}          # the latest used last
+        self._alive: weakref.WeakValueDictionary[Hashable, T] = weakref.WeakValueDictionary()
         self._making: weakref.WeakValueDictionary[Hashable, threading.Lock] = weakref.WeakValueDictionary()
         self._lock = threading.Lock()
 
     def get(self, key: Hashable, make: Callable[[], T]) -> T:
         """Return what has a key, made if it is not there; who asks second waits and finds it."""
         with self._lock:
-            if key in self._kept:
-                return self._used(key)
             making = self._making.setdefault(key, threading.Lock())
         with making:
-            with self._lock:
-                if key in self._kept:
-                    return self._used(key)
-            made = make()
-            self.put(key, made)
-        return made
+            found = self._alive.get(key)
+            if found is None:
+                found = make()
+            self.put(key, found)
+        return found
 
     def put(self, key: Hashable, one: T) -> None:
         """Keep something."""
         with self._lock:
             self._kept.pop(key, None)
-            self._kept[key] = one
-            for old in list(self._kept):
-                if len(self._kept) <= self._most:
-                    break
-                if old != key and not self._held(old):
-                    del self._kept[old]
+            self._kept[key] = self._alive[key] = one
+            while len(self._kept) > self._most:
+                del self._kept[next(iter(self._kept))]
 
-    def forget(self, true: Callable[[Hashable], bool] = lambda key: True) -> None:
-        """Drop what has a key of which something is true; by default everything."""
+    def forget(self, key: Hashable) -> None:
+        """Have the next who asks for a key make it anew."""
         with self._lock:
-            self._kept = {key: one for key, one in self._kept.items() if not true(key)}
-
-    def __len__(self) -> int:
-        return len(self._kept)
-
-    def _used(self, key: Hashable) -> T:
-        self._kept[key] = one = self._kept.pop(key)
-        return one
+            self._kept.pop(key, None)
+            self._alive.pop(key, None)
