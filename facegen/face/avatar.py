@@ -196,9 +196,10 @@ class AvatarFace:
 
     def head_angles(self, found: Resolution) -> Array:
         """Return how the head turns (4,) in what was resolved: as `turned` takes it."""
-        head = found.deformation.head
-        forward = head.get("forward", 0.0) * (self._mouth_width if found.deformation.units == "face" else 1.0)
-        return np.array([*(head.get(key, 0.0) for key in ("yaw", "pitch", "roll")), forward])
+        every = [[one.head.get(key, 0.0) for key in ("yaw", "pitch", "roll", "forward")]
+                 for one in (found.deformation, *found.more)]
+        lengths = [self._mouth_width if one.units == "face" else 1.0 for one in (found.deformation, *found.more)]
+        return (np.array(every) * [[1.0, 1.0, 1.0, length] for length in lengths]).sum(axis=0)
 
     def resolve(self, what: Any, *, person: Any = None, intensity: float = 1.0) -> Resolution:
         """Return the chain name -> units -> deformation data; what has been resolved is returned as it is."""
@@ -234,7 +235,7 @@ class AvatarFace:
         if lost > LOST:
             warnings.append(f"{self.path.name} has no shapes for {100 * lost:.0f} % of this movement; the nearest is "
                             "shown")
-        if meaning.deformation.head and not self.notes.framed:
+        if any(one.head for one in (meaning.deformation, *meaning.more)) and not self.notes.framed:
             warnings.append(f"{self.path.name} does not say where its neck is, so the head does not turn; "
                             "`facegen rig` notes it")
         return tuple(warnings)
@@ -244,7 +245,7 @@ class AvatarFace:
         table = load_units().with_basis(found.own)
         members = {name: value for name, value in table.coefficients(found.units).items() if not is_head(name)}
         members, own = as_common(members, found.own)
-        raw = tuple(one for one in (_beyond(found, table), *own, *found.more) if one)
+        raw = tuple(one for one in (_beyond(found, table), *own, *map(_headless, found.more)) if one)
         if not members and not raw:
             return {}, 0.0
         return self.made_of(held(members), raw)
@@ -344,9 +345,13 @@ def _beyond(found: Resolution, table: Any) -> Deformation | None:
     if found.units:
         made = weighted_sum([(value, table.basis[name]) for name, value in table.coefficients(found.units).items()])
         rest = whole - made             # sums are exact to the last bit: what units alone make leaves nothing
-    if rest.head:
-        rest = Deformation(rest.points, rest.jaw, rest.lids, rest.eyes, {}, rest.folds, rest.units, rest.with_jaw)
+    rest = _headless(rest)
     return rest if rest else None
+
+
+def _headless(one: Deformation) -> Deformation:
+    """Return a movement without the head's, which no shape makes: it turns on its neck."""
+    return replace(one, head={}) if one.head else one
 
 
 @cache
