@@ -187,12 +187,13 @@ class AvatarFace:
         np.add.at(weights, (..., half), 4.0 * between * (1.0 - between))
         return weights
 
-    def turned(self, vertices: Array, head: Array) -> Array:
+    def turned(self, vertices: Array, head: Array, rest: Mesh | None = None) -> Array:
         """Return posed vertices (..., n, 3) with the head turned: head (..., 4) is yaw, pitch, roll in degrees and
-        forward in mm. Nothing turns where the file does not say where the neck is."""
+        forward in mm. rest: the neutral, mm, that they are of if it is not `mesh`: a file of another kind has the same
+        avatar's vertices in another order. Nothing turns where the file does not say where the neck is."""
         if not np.any(head) or not self.notes.framed:
             return vertices
-        return turn_head(vertices, head, self.neck, self.neck_weight)
+        return turn_head(vertices, head, self.neck, self.neck_weight if rest is None else self._neck_weight(rest))
 
     def head_angles(self, found: Resolution) -> Array:
         """Return how the head turns (4,) in what was resolved: as `turned` takes it."""
@@ -332,9 +333,12 @@ class AvatarFace:
     @cached_property
     def neck_weight(self) -> Array:
         """How much of the head's turn each vertex makes (n, 1)."""
-        weight = neck_weight(self._mesh.vertices, self.neck + _MOVES_ABOVE, self.neck + _RESTS_BELOW)
-        for part in set(self.notes.parts("body")) & set(self._mesh.parts):
-            weight[self._mesh.part_vertices(part)] = 0.0
+        return self._neck_weight(self._mesh)
+
+    def _neck_weight(self, mesh: Mesh) -> Array:
+        weight = neck_weight(mesh.vertices, self.neck + _MOVES_ABOVE, self.neck + _RESTS_BELOW)
+        for part in set(self.notes.parts("body")) & set(mesh.parts):
+            weight[mesh.part_vertices(part)] = 0.0
         return weight
 
 
