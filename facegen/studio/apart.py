@@ -39,7 +39,8 @@ _CLASSES = {("pathlib", "PosixPath"), ("pathlib", "WindowsPath"), ("pathlib", "P
             ("numpy._core.multiarray", "_reconstruct"), ("numpy._core.numeric", "_frombuffer"),
             ("numpy.core.numeric", "_frombuffer"), ("numpy._core.multiarray", "scalar"),
             ("numpy.core.multiarray", "scalar"), ("builtins", "frozenset")}
-_OURS = ("facegen.fileio.", "facegen.geometry.mesh", "facegen.animation.performance")
+_OURS = ("facegen.fileio.", "facegen.geometry.", "facegen.animation.performance", "facegen.landmarking.",
+         "facegen.transfer.alignment")
 
 
 def patient(seconds: float) -> None:
@@ -100,7 +101,7 @@ def _heard(process: subprocess.Popen[bytes], asked: bytes, seconds: float, waits
 
 
 class Answers(pickle.Unpickler):
-    """Reads an answer that is made of nothing but avatars, recordings, numbers and text."""
+    """Reads an answer that is made of nothing but avatars, recordings, found faces, numbers and text."""
 
     def find_class(self, module: str, name: str) -> Any:
         """Return a class that may be part of an answer; UnpicklingError."""

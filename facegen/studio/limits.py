@@ -17,8 +17,9 @@ class Limits:
     characters of one text of a page. habits: of a person's table, expressions, words and units. items: keys and events
     of a clip. triangles: of an opened avatar. recorded_seconds, frames, numbers: of an opened
     recording, as long as it lasts and as much as it holds. read_seconds, read_bytes: what reading an avatar or a
-    recording may take. export_bytes: of pictures that lie on the disk until a film is whole. download_bytes: of one
-    file that is sent to a browser, which holds it in memory until all is there.
+    recording may take. search_seconds: for looking for a face on an avatar. export_bytes: of pictures that lie on the
+    disk until a film is whole. download_bytes: of one file that is sent to a browser, which holds it in memory until
+    all is there.
     """
 
     pages: int = 16
@@ -38,6 +39,7 @@ class Limits:
     numbers: int = 30_000_000
     read_seconds: float = 60.0
     read_bytes: int = 2048 * MEBIBYTE
+    search_seconds: float = 300.0
     export_bytes: int = 4096 * MEBIBYTE
     download_bytes: int = 512 * MEBIBYTE
 

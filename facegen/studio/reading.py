@@ -1,19 +1,26 @@
-"""Strangers' avatars and recordings, read in a process of its own (`facegen.studio.apart`): nothing of it stays.
+"""What is done with strangers' files in a process of its own (`facegen.studio.apart`): avatars and recordings are read,
+faces on avatars are looked for.
 
 The readers of facegen.fileio and facegen.animation.streams check what they read. This is for what they might not know:
-a file that makes them slow or hungry ends its own process, and no page.
+a file that makes them slow or hungry ends its own process, and no page. Looking for a face takes so long that other
+pages would notice.
 """
 
 from __future__ import annotations
 
 import os
+from dataclasses import replace
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from facegen.animation.performance import Performance
 from facegen.errors import FileError, InputError
 from facegen.fileio.avatar import READABLE, AvatarFile, load_avatar
 from facegen.studio.apart import Waits, Wish, ask, patient
 from facegen.studio.limits import LIMITS, Limits
+
+if TYPE_CHECKING:
+    from facegen.landmarking.propose import Searched
 
 STREAM = ".fgp"
 """What the name of a recording in facegen's few bits ends in."""
@@ -46,6 +53,14 @@ def read_recording_safely(path: Path, limits: Limits, *, fps: float | None = Non
             "numbers": limits.numbers,
             "clean": {"calibrate": calibrate, "calibrate_head": calibrate_head, "smooth": smooth}}
     return ask("recording", path, limits, wish, waits)
+
+
+def search_safely(path: Path, limits: Limits = LIMITS, waits: Waits = patient) -> Searched:
+    """Return what `facegen.Proposer.search` finds on the avatar of a file, looked for by another process.
+
+    waits: see `facegen.studio.apart.ask`. Raises FileError for what takes longer than ``limits.search_seconds``.
+    """
+    return ask("search", path, replace(limits, read_seconds=limits.search_seconds), {}, waits)
 
 
 def cleaned(plain: Performance, *, calibrate: str = "", calibrate_head: bool = False, smooth: str = "") -> Performance:
@@ -110,5 +125,11 @@ def _performance(path: Path, fps: float | None, person: str | None) -> Performan
         return performance_of(decoder, list(read_stream(decoder, file)))
 
 
-JOBS = {"avatar": _avatar, "recording": _recording}
+def _search(path: Path, wish: Wish) -> Any:
+    from facegen.landmarking.propose import Proposer
+
+    return Proposer(load_avatar(path).mesh).search()
+
+
+JOBS = {"avatar": _avatar, "recording": _recording, "search": _search}
 """What the other process can be asked for."""

@@ -16,6 +16,7 @@ import facegen
 from facegen.animation.performance import Performance
 from facegen.errors import FileError, InputError
 from facegen.fileio.avatar import load_avatar
+from facegen.fileio.obj import format_obj
 from facegen.geometry.mesh import Mesh
 from facegen.studio import apart, reading
 from facegen.studio.counting import triangles
@@ -165,6 +166,46 @@ def test_who_waits_can_have_it_ended_at_once(tmp_path, monkeypatch):
             read(tmp_path / "a.obj", LIMITS, waits=waits)
         assert told == sorted(told)
         assert processes[0].poll() is not None
+
+
+def test_a_face_is_looked_for_in_the_other_process(tmp_path, monkeypatch):
+    """It takes ten seconds to a minute; in the studio's own process other pages waited up to 0.4 s where it was busy."""
+    from facegen.landmarking import propose
+    from facegen.studio.proposing import Adviser
+    from facegen.studio.work import AvatarWork
+
+    path = tmp_path / "half.obj"
+    path.write_text(format_obj(facegen.load_face().mesh(0)))
+    mesh = load_avatar(path).mesh
+    monkeypatch.setattr(propose, "candidates", lambda *_: pytest.fail("it was looked for here"))
+    adviser, told = Adviser(mesh, path), []
+    advice = adviser.advice(AvatarWork(file="half.obj"), told.append)
+    assert advice.sure > 0.9
+    assert {"nose_tip", "chin", "mouth_corner_L"} <= set(advice.places)
+    assert advice.advised == "eye_outer_L"
+    assert adviser.ready
+    assert told
+    told.clear()
+    assert adviser.advice(AvatarWork(file="half.obj"), told.append).sure == advice.sure
+    assert not told
+
+
+def test_who_goes_while_a_face_is_looked_for_leaves_nothing(tmp_path, monkeypatch, shipped):
+    from facegen.studio.proposing import Adviser
+    from facegen.studio.work import AvatarWork
+
+    def waits(seconds):
+        raise Stopped
+
+    adviser = Adviser(load_avatar(shipped).mesh, shipped)
+    with pytest.raises(Stopped):
+        adviser.advice(AvatarWork(file="cat"), waits)
+    assert not adviser.ready
+    monkeypatch.setattr(apart, "_PROGRAM", "raise SystemExit(3)")
+    advice = adviser.advice(AvatarWork(file="cat"))
+    assert "No face could be looked for" in advice.warnings[0]
+    assert str(shipped.parent) not in advice.warnings[0]
+    assert not advice.places
 
 
 def test_a_recording_is_read_as_ever(tmp_path):
