@@ -148,8 +148,14 @@ def shots(tmp_path_factory) -> Path:
     return folder
 
 
+@pytest.fixture(scope="session")
+def thumbnails(tmp_path_factory) -> Path:
+    """Where the pictures of expressions are kept: drawn once, not by each test beside what it looks at."""
+    return tmp_path_factory.mktemp("thumbnails")
+
+
 @pytest.fixture
-def studio(viser, tmp_path):
+def studio(viser, tmp_path, thumbnails):
     """A function that runs the whole studio on a free port, its works in a folder of its own: ``studio() -> Studio``.
 
     ``browser_page(studio().server)`` opens it.
@@ -158,8 +164,13 @@ def studio(viser, tmp_path):
 
     def start(**options):
         from facegen.studio.app import Studio
+        from facegen.studio.palette import KEPT
 
-        made = Studio(tmp_path / "works", **{"port": 0, **options})
+        works = tmp_path / "works"
+        works.mkdir(exist_ok=True)
+        if not (works / KEPT).exists():
+            (works / KEPT).symlink_to(thumbnails)
+        made = Studio(works, **{"port": 0, **options})
         running.append(made)
         made.start()
         return made

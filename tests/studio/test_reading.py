@@ -169,7 +169,7 @@ def test_who_waits_can_have_it_ended_at_once(tmp_path, monkeypatch):
 
 
 def test_a_face_is_looked_for_in_the_other_process(tmp_path, monkeypatch):
-    """It takes ten seconds to a minute; in the studio's own process other pages waited up to 0.4 s where it was busy."""
+    """It takes ten seconds to a minute; in the studio's own process others waited up to 0.4 s where it was busy."""
     from facegen.landmarking import propose
     from facegen.studio.proposing import Adviser
     from facegen.studio.work import AvatarWork
