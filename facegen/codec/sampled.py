@@ -7,20 +7,22 @@ import numpy as np
 from facegen.animation.clip import Clip
 from facegen.animation.performance import Performance
 from facegen.facs.tables import load_units
+from facegen.progress import Progress, counted, silent
 
 _ANGLES = ("head", "gaze")
 _HEAD = ("yaw", "pitch", "roll")
 _GAZE = ("yaw_L", "pitch_L", "yaw_R", "pitch_R")
 
 
-def clip_performance(clip: Clip, fps: float = 25.0) -> Performance:
+def clip_performance(clip: Clip, fps: float = 25.0, progress: Progress = silent) -> Performance:
     """Return a clip's action units by side, head and gaze, ``fps`` times a second.
 
     Turns of the head and of the eyes are angles, not weights. Raw data in its poses are no units and are left out,
-    which ``warnings`` says.
+    which ``warnings`` says. progress: called before each frame.
     """
     catalogue = load_units().catalogue
-    frames = list(clip.sample(fps))
+    told = counted(progress, "working out the frames", range(clip.frames(fps)))
+    frames = [frame for _, frame in zip(told, clip.sample(fps), strict=True)]
     weights = [{atom: weight for atom, weight in catalogue.expand(frame.units).items()
                 if catalogue.unit_of(atom).region not in _ANGLES} for frame in frames]
     used = {atom for one in weights for atom in one}

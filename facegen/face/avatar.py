@@ -187,18 +187,20 @@ class AvatarFace:
         np.add.at(weights, (..., half), 4.0 * between * (1.0 - between))
         return weights
 
-    def turned(self, vertices: Array, head: Array) -> Array:
+    def turned(self, vertices: Array, head: Array, rest: Mesh | None = None) -> Array:
         """Return posed vertices (..., n, 3) with the head turned: head (..., 4) is yaw, pitch, roll in degrees and
-        forward in mm. Nothing turns where the file does not say where the neck is."""
+        forward in mm. rest: the neutral, mm, that they are of if it is not `mesh`: a file of another kind has the same
+        avatar's vertices in another order. Nothing turns where the file does not say where the neck is."""
         if not np.any(head) or not self.notes.framed:
             return vertices
-        return turn_head(vertices, head, self.neck, self.neck_weight)
+        return turn_head(vertices, head, self.neck, self.neck_weight if rest is None else self._neck_weight(rest))
 
     def head_angles(self, found: Resolution) -> Array:
         """Return how the head turns (4,) in what was resolved: as `turned` takes it."""
-        head = found.deformation.head
-        forward = head.get("forward", 0.0) * (self._mouth_width if found.deformation.units == "face" else 1.0)
-        return np.array([*(head.get(key, 0.0) for key in ("yaw", "pitch", "roll")), forward])
+        every = [[one.head.get(key, 0.0) for key in ("yaw", "pitch", "roll", "forward")]
+                 for one in (found.deformation, *found.more)]
+        lengths = [self._mouth_width if one.units == "face" else 1.0 for one in (found.deformation, *found.more)]
+        return (np.array(every) * [[1.0, 1.0, 1.0, length] for length in lengths]).sum(axis=0)
 
     def resolve(self, what: Any, *, person: Any = None, intensity: float = 1.0) -> Resolution:
         """Return the chain name -> units -> deformation data; what has been resolved is returned as it is."""
@@ -234,7 +236,7 @@ class AvatarFace:
         if lost > LOST:
             warnings.append(f"{self.path.name} has no shapes for {100 * lost:.0f} % of this movement; the nearest is "
                             "shown")
-        if meaning.deformation.head and not self.notes.framed:
+        if any(one.head for one in (meaning.deformation, *meaning.more)) and not self.notes.framed:
             warnings.append(f"{self.path.name} does not say where its neck is, so the head does not turn; "
                             "`facegen rig` notes it")
         return tuple(warnings)
@@ -244,7 +246,7 @@ class AvatarFace:
         table = load_units().with_basis(found.own)
         members = {name: value for name, value in table.coefficients(found.units).items() if not is_head(name)}
         members, own = as_common(members, found.own)
-        raw = tuple(one for one in (_beyond(found, table), *own, *found.more) if one)
+        raw = tuple(one for one in (_beyond(found, table), *own, *map(_headless, found.more)) if one)
         if not members and not raw:
             return {}, 0.0
         return self.made_of(held(members), raw)
@@ -331,9 +333,12 @@ class AvatarFace:
     @cached_property
     def neck_weight(self) -> Array:
         """How much of the head's turn each vertex makes (n, 1)."""
-        weight = neck_weight(self._mesh.vertices, self.neck + _MOVES_ABOVE, self.neck + _RESTS_BELOW)
-        for part in set(self.notes.parts("body")) & set(self._mesh.parts):
-            weight[self._mesh.part_vertices(part)] = 0.0
+        return self._neck_weight(self._mesh)
+
+    def _neck_weight(self, mesh: Mesh) -> Array:
+        weight = neck_weight(mesh.vertices, self.neck + _MOVES_ABOVE, self.neck + _RESTS_BELOW)
+        for part in set(self.notes.parts("body")) & set(mesh.parts):
+            weight[mesh.part_vertices(part)] = 0.0
         return weight
 
 
@@ -344,9 +349,13 @@ def _beyond(found: Resolution, table: Any) -> Deformation | None:
     if found.units:
         made = weighted_sum([(value, table.basis[name]) for name, value in table.coefficients(found.units).items()])
         rest = whole - made             # sums are exact to the last bit: what units alone make leaves nothing
-    if rest.head:
-        rest = Deformation(rest.points, rest.jaw, rest.lids, rest.eyes, {}, rest.folds, rest.units, rest.with_jaw)
+    rest = _headless(rest)
     return rest if rest else None
+
+
+def _headless(one: Deformation) -> Deformation:
+    """Return a movement without the head's, which no shape makes: it turns on its neck."""
+    return replace(one, head={}) if one.head else one
 
 
 @cache

@@ -233,6 +233,10 @@ class Face:
             self.controls(meaning.deformation, *meaning.more)
         return ()
 
+    def head_angles(self, found: Resolution) -> Array:
+        """Return how the head turns (4,) in what was resolved: yaw, pitch, roll in degrees and forward in mm."""
+        return self.controls(found.deformation, *found.more, strict=False).head
+
     def controls(self, deformation: Deformation, *more: Deformation, strict: bool = True) -> Controls:
         """Return the deformer's input, mm and degrees, for deformation data in its own units, or the sum of several.
 

@@ -35,6 +35,9 @@ class Rig(Protocol):
     def resolve(self, what: Any, *, person: Any = None, intensity: float = 1.0) -> Resolution:
         """Return what an input means."""
 
+    def head_angles(self, found: Resolution) -> NDArray[np.float64]:
+        """Return how the head turns (4,) in what was resolved: yaw, pitch, roll in degrees and forward in mm."""
+
     def check(self, meaning: Resolution) -> tuple[str, ...]:
         """Return what to warn of before this is shown; InputError if it cannot be shown."""
 

@@ -206,12 +206,12 @@ def person_from_data(data: object, source: str = "person", *, name: str = "perso
             entries[word] = entry
     if not any(key in fields for key in ("aliases", "units")) and not table:
         raise root.fail(f"a person has at least one of: {', '.join(HABITS)}")
-    aliases = _aliases(table, entries)
+    aliases, known = _aliases(table, entries), dict.fromkeys((*table, *common.expressions))
     for word, entry in fields["aliases"].items() if "aliases" in fields else ():
         _name(entry, word)
         if word in table or word in aliases:
             raise entry.fail(f"'{word}' already means an expression of this person")
-        aliases[word] = entry.choice((*table, *common.expressions), "expression")
+        aliases[word] = entry.choice(known, "expression")
     units = read_own_units(catalogue, fields["units"]) if "units" in fields else {}
     name = fields["name"].text() if "name" in fields else name
     return Person(name, fields["about"].text(), said, table, aliases, units)

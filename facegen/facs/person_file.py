@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from facegen.errors import FileError, InputError
-from facegen.facs.expression_table import Person, person_from_data
+from facegen.facs.expression_table import HABITS, Person, person_from_data
 from facegen.facs.yamlfile import parse_bytes, parse_yaml
 from facegen.facs.yamltext import entry_lines, yaml_text
 from facegen.fileio.textfile import check_place, save_text
@@ -61,11 +61,32 @@ def person_change(data: Mapping[str, Any], path: str | os.PathLike[str]) -> Chan
     return Change(path, before, after, person_from_data(parse_yaml(after, str(path)), str(path), name=path.stem), kept)
 
 
-def read_person_data(content: bytes, name: str) -> dict[str, Any]:
-    """Return the plain data of a person's table, given its file's content and name; InputError if it is none."""
+def read_person_data(content: bytes, name: str, *, most: int | None = None) -> dict[str, Any]:
+    """Return the plain data of a person's table, given its file's content and name; InputError if it is none.
+
+    most: habits that it may have, see `check_count`.
+    """
     data = parse_bytes(content, name)
+    if most is not None:
+        check_count(data, most, name)
     person_from_data(data, name)
     return data
+
+
+def check_count(data: object, most: int, source: str = "person") -> None:
+    """Raise InputError for a person's table, as plain data, with more habits (expressions, words for them, units) than
+    so many: each takes a moment to read."""
+    entries = [entry for key in HABITS for entry in _inner(data, key).items()]
+    count = len(entries) + sum(len(_inner(one, "also", list)) for _, one in entries)
+    if count > most:
+        raise InputError(f"{source}: has {count:,} habits (expressions, other words for them, units); expected up to "
+                         f"{most:,}")
+
+
+def _inner(data: object, key: str, kind: type = dict) -> Any:
+    """Return what stands under a key, empty where it is of another kind: whoever reads the table says so."""
+    found = data.get(key) if isinstance(data, dict) else None
+    return found if isinstance(found, kind) else kind()
 
 
 def changed_text(text: str, data: Mapping[str, Any]) -> tuple[str, bool]:

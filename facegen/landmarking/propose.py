@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import product
 from typing import Any
@@ -61,6 +61,8 @@ _MIRRORED = 0.9
 _BESIDE_BALL = 4.0
 # The middles of the base face's eyeballs, mm.
 _BALLS = {"L": np.array([28.9, 0.0, 0.0]), "R": np.array([-28.9, 0.0, 0.0])}
+
+
 def propose_landmarks(mesh: Mesh | str | os.PathLike[str], known: Mapping[str, Any] | None = None) -> Proposals:
     """Return places for the landmarks of a mesh, given or read from a file, each with a confidence.
 
@@ -97,12 +99,24 @@ class _Found:
     held: Mapping[str, Array]
 
 
+@dataclass(frozen=True, eq=False)
+class Searched:
+    """What a `Proposer` found on its mesh with no place known, which takes it seconds: for another of the same mesh, in
+    another process. Without anything: that no face was found."""
+
+    planes: list[Plane] | None = None
+    start: tuple[Laid, float] | None = None
+    found: _Found | None = None
+    skin: NDArray[np.int64] | None = None
+    balls: Mapping[str, Array] = field(default_factory=dict)
+
+
 class Proposer:
     """Proposes landmarks for one mesh, again and again as more become known."""
 
-    def __init__(self, mesh: Mesh) -> None:
-        """mesh: in any axes and units. Raises InputError for one without triangles or with places that are not
-        finite."""
+    def __init__(self, mesh: Mesh, searched: Searched | None = None) -> None:
+        """mesh: in any axes and units. searched: what another found on it. Raises InputError for a mesh without
+        triangles or with places that are not finite."""
         if not len(mesh.faces) or not np.isfinite(mesh.vertices).all():
             raise InputError("mesh: expected at least one triangle and finite vertices")
         size = float(np.ptp(mesh.vertices[mesh.faces].reshape(-1, 3), axis=0).max())
@@ -121,8 +135,20 @@ class Proposer:
         self._area = float(areas.sum())
         self._plane_kept: tuple[Laid, Plane] | None = None
         self._balls: dict[str, Array] = {}              # of recognised eyes, known with the skin
+        if searched is not None:
+            self._balls = dict(searched.balls)
+            # As if they had been asked for.
+            self.__dict__ |= {"_start": searched.start, "_found": searched.found}
+            if searched.planes is not None:
+                self.__dict__["_planes"] = searched.planes
+            if searched.skin is not None:
+                self.__dict__["_skin"] = _Skin(mesh, searched.skin)
 
     # -- what does not depend on what is known -------------------------------------------------------------------------
+    def search(self) -> Searched:
+        """Return what is found with no place known."""
+        return Searched(self._planes, self._start, self._found, self._skin.rows, self._balls)
+
     @cached_property
     def _planes(self) -> list[Plane]:
         samples = sample_surface(self._surface.corners, np.sqrt(2 * self._area / _SAMPLES))

@@ -5,8 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
-from functools import lru_cache
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TypeVar
 
@@ -14,10 +13,13 @@ import numpy as np
 
 from facegen.errors import FileError, InputError
 from facegen.fileio.avatar import AvatarFile, load_avatar
+from facegen.fileio.gltf_read import GltfScene
 from facegen.fileio.obj import ObjFile
 from facegen.fileio.textfile import make_folder, whole_file
-from facegen.studio.limits import MEBIBYTE, Limits
+from facegen.studio.apart import Waits, patient
+from facegen.studio.limits import LIMITS, MEBIBYTE
 from facegen.studio.reading import read_avatar_safely
+from facegen.studio.recent import Recent
 from facegen.transfer.rig import avatar_files, avatar_names
 
 T = TypeVar("T")
@@ -27,16 +29,15 @@ FOLDER = "avatar"
 
 TAKEN = (".obj", ".glb", ".vrm", ".ply", ".stl", ".gltf")
 
-LIMITS = Limits()
-"""What is taken at most. An avatar for games has a tenth of the triangles."""
-
 COLOURS = ".mtl"
 """What the name of an OBJ file's colours ends in."""
 
 _COLOURS = MEBIBYTE     # bytes: colours are a few lines
 _UNSAFE = re.compile(r"[^\w.-]+")
 _LONGEST = 60
-_KEPT = 4               # avatars in memory: those of a few steps of undo
+
+# Avatars in memory: those of a few steps of undo.
+_recent: Recent[AvatarFile] = Recent(4)
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,11 +73,11 @@ def safe_name(name: str, taken: tuple[str, ...] = TAKEN, kind: str = "an avatar"
     return stem[:_LONGEST] + suffix
 
 
-def keep(folder: Path, name: str, content: bytes) -> str:
+def keep(folder: Path, name: str, content: bytes, waits: Waits = patient) -> str:
     """Keep a file that came from a browser in a work's folder and return its name there; InputError if it is too much.
 
     Another file of the same name stays: who undoes goes back to it. The file is read before it is kept, by a process of
-    its own.
+    its own. waits: see `facegen.studio.apart.ask`.
     """
     name = safe_name(name)
     if len(content) > LIMITS.file_bytes:
@@ -84,8 +85,9 @@ def keep(folder: Path, name: str, content: bytes) -> str:
                          f"{LIMITS.file_bytes / MEBIBYTE:.0f}; leave out pictures and clothes, or use the command "
                          "facegen rig")
     place = make_folder(folder / FOLDER)
-    return keep_read(place, name, content, lambda path: _check(read_avatar_safely(path, LIMITS), name), "the avatar ",
-                     _taken)[0]
+    kept, found = keep_read(place, name, content, lambda path: _read(path, waits), "the avatar ", _taken)
+    _recent.put(_key(place / kept), _moved(found, place / kept))
+    return kept
 
 
 def keep_read(place: Path, name: str, content: bytes, read: Callable[[Path], T], what: str,
@@ -121,9 +123,9 @@ def _taken(place: Path, name: str) -> bool:
                                          for one in place.iterdir())
 
 
-def keep_from(folder: Path, path: Path) -> str:
+def keep_from(folder: Path, path: Path, waits: Waits = patient) -> str:
     """Keep a copy of a file of this machine, and of its colours, in a work's folder; as `keep`."""
-    name = keep(folder, path.name, path.read_bytes())
+    name = keep(folder, path.name, path.read_bytes(), waits)
     opened = open_avatar(folder, name)
     for library in _libraries(opened.avatar):
         beside = path.parent / library
@@ -143,7 +145,7 @@ def keep_colours(folder: Path, opened: Opened, name: str, content: bytes) -> Non
         raise InputError(f"file: '{base}' is too large for a list of colours")
     with whole_file(folder / FOLDER / base, "the colours ") as draft:
         draft.write_bytes(content)
-    _read.cache_clear()
+    _recent.forget(_key(opened.path))
 
 
 def lost_colours(opened: Opened) -> str | None:
@@ -173,18 +175,30 @@ def open_avatar(folder: Path, name: str) -> Opened:
     """Return an avatar that was kept in a work's folder, or a shipped one by name; InputError or FileError."""
     if name in avatar_names():
         path = avatar_files(name, None)[0]
-    else:
-        path = folder / FOLDER / safe_name(name)
-        if not path.is_file():
-            raise FileError(f"avatar: '{name}' is no longer in the folder of this work; open it again")
-    return Opened(name, path, _read(path, path.stat().st_mtime_ns))
+        return Opened(name, path, _recent.get(_key(path), lambda: load_avatar(path)))
+    path = folder / FOLDER / safe_name(name)
+    if not path.is_file():
+        raise FileError(f"avatar: '{name}' is no longer in the folder of this work; open it again")
+    return Opened(name, path, _recent.get(_key(path), lambda: _read(path)))
 
 
-@lru_cache(maxsize=_KEPT)
-def _read(path: Path, changed: int) -> AvatarFile:
-    avatar = load_avatar(path)
-    _check(avatar, path.name)
-    return avatar
+def _key(path: Path) -> tuple[Path, int]:
+    return path, path.stat().st_mtime_ns
+
+
+def _read(path: Path, waits: Waits = patient) -> AvatarFile:
+    """Return what a process of its own reads of a file that a person sent."""
+    found = read_avatar_safely(path, LIMITS, waits)
+    _check(found, path.name)
+    return found
+
+
+def _moved(avatar: AvatarFile, path: Path) -> AvatarFile:
+    """Return an avatar whose file has another path."""
+    source = avatar.source
+    if isinstance(source, GltfScene):
+        source = replace(source, file=replace(source.file, path=path))
+    return replace(avatar, path=path, source=source)
 
 
 def _check(avatar: AvatarFile, name: str) -> None:

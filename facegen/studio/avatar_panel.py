@@ -9,6 +9,7 @@ from typing import Any
 
 from facegen.fileio.textfile import make_folder, save_text
 from facegen.studio import picking
+from facegen.studio.apart import Waits
 from facegen.studio.avatar_file import (
     COLOURS,
     FOLDER,
@@ -24,7 +25,7 @@ from facegen.studio.avatar_scene import AvatarScene
 from facegen.studio.page import Page
 from facegen.studio.picker_view import PickerView
 from facegen.studio.rigging_view import RiggingView
-from facegen.studio.task import Task
+from facegen.studio.task import Task, while_read
 from facegen.studio.work import AvatarWork, Work
 from facegen.transfer.landmarks import load_landmarks
 from facegen.transfer.rig import avatar_names
@@ -43,6 +44,7 @@ class AvatarPanel:
         self.folder = page.desk.store.folder_of(page.name)
         self.scene = AvatarScene(page)
         self._last: AvatarWork | None = None        # what is shown
+        self._task: Task | None = None              # what reads a file
         gui = page.client.gui
         with gui.add_folder("1 Avatar") as self._first:
             self._make_open(gui)
@@ -126,21 +128,19 @@ class AvatarPanel:
             keep_colours(self.folder, self.scene.opened, given.name, given.content)
             self._again()
         else:
-            self._read(given.name, lambda: keep(self.folder, given.name, given.content))
+            self._read(given.name, lambda waits: keep(self.folder, given.name, given.content, waits))
 
     def _taken(self) -> None:
         if self._shelf.value != _NONE:
             path = self.page.desk.shelf.resolve(self._shelf.value, TAKEN)
-            self._read(path.name, lambda: keep_from(self.folder, path))
+            self._read(path.name, lambda waits: keep_from(self.folder, path, waits))
 
-    def _read(self, title: str, job: Callable[[], str]) -> None:
-        """Read a file beside the page and open it."""
-        def read(report: Any) -> str:
-            report("reading", 0.3)
-            return job()
-
+    def _read(self, title: str, job: Callable[[Waits], str]) -> None:
+        """Read a file beside the page and open it; of two that are opened, the second."""
+        if self._task is not None:
+            self._task.stop()
         with self._first:
-            Task(self.page, title[:60], read, self._opened)
+            self._task = Task(self.page, title[:60], lambda report: job(while_read(report)), self._opened)
 
     def _chosen(self) -> None:
         if self._ours.value != _NONE:
@@ -193,5 +193,7 @@ class AvatarPanel:
 
     def close(self) -> None:
         """End what runs."""
+        if self._task is not None:
+            self._task.stop()
         self.picker.close()
         self.rigging.close()

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import re
-import threading
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -15,6 +14,7 @@ from facegen.face.named import face_names
 from facegen.facs.expression_table import Person, load_person, people
 from facegen.fileio.textfile import make_folder
 from facegen.studio.files import Shelf
+from facegen.studio.recent import Recent
 from facegen.studio.store import Store
 
 FACES = "faces"
@@ -27,6 +27,7 @@ RIGGED = (".glb", ".vrm")
 """What their names end in."""
 
 _AVATARS = "avatars"
+_FACES = 8              # in memory, beside those that pages show: what a few people go back to
 _FILE = re.compile(r"[\w][\w -]{0,59}\.yaml")
 
 
@@ -38,9 +39,8 @@ class Desk:
 
     def __init__(self, folder: str | os.PathLike[str], shelf: Shelf | None = None) -> None:
         self.store, self.shelf = Store(make_folder(folder)), shelf or Shelf()
-        self._faces: dict[Path | str, Any] = {}
-        self._locks: dict[Path | str, threading.Lock] = {}
-        self._lock = threading.Lock()
+        self._faces: Recent[Any] = Recent(_FACES)
+        self._made: set[str] = set()                # shipped avatars that have their blendshapes
 
     def face_names(self, work: str) -> tuple[str, ...]:
         """Return the faces that a page can show: shipped faces and avatars, and what was rigged there."""
@@ -51,22 +51,17 @@ class Desk:
         return (*face_names(), *avatar_names(), *rigged)
 
     def face(self, name: str, work: str, *, wait: Callable[[str], None] = lambda why: None) -> Any:
-        """Return a face by name, loaded once. A shipped avatar is rigged when it is first asked for.
+        """Return a face by name, loaded once while a page shows it and a while longer. A shipped avatar is rigged when
+        it is asked for.
 
         wait: called with the reason, if it takes more than a moment. InputError for an unknown name.
         """
         if name not in self.face_names(work):
             raise InputError(f"face: unknown face '{name}'{nearest(name, self.face_names(work))}")
         own = self.store.folder / work / FACES / name
-        key = own if own.suffix in RIGGED else name
-        with self._lock:
-            lock = self._locks.setdefault(key, threading.Lock())
-        with lock:                              # who asks second waits and finds it
-            changed = own.stat().st_mtime_ns if key is own else None
-            found = self._faces.get(key)
-            if found is None or found[0] != changed:
-                self._faces[key] = found = changed, self._load(key, wait)
-        return found[1]
+        if own.suffix in RIGGED:
+            return self._faces.get((own, own.stat().st_mtime_ns), lambda: load_face(own))
+        return self._faces.get(name, lambda: load_face(name) if name in face_names() else self._rigged(name, wait))
 
     def face_file(self, name: str, work: str) -> str:
         """Return what `facegen.load_face` takes for a face that `face` gave: its name, or its file's path."""
@@ -95,14 +90,14 @@ class Desk:
             raise InputError(f"person: expected a name of letters, digits, _ and -, got {name.removesuffix('.yaml')!r}")
         return self.store.folder_of(work) / PEOPLE / name
 
-    def _load(self, key: Path | str, wait: Callable[[str], None]) -> Any:
-        if isinstance(key, Path) or key in face_names():
-            return load_face(key)
+    def _rigged(self, name: str, wait: Callable[[str], None]) -> Any:
+        """Return a shipped avatar with blendshapes."""
         from facegen.transfer.rig import rig
 
-        folder = make_folder(self.store.folder / _AVATARS)
-        path = folder / f"{key}.glb"
-        wait(f"{key} gets its blendshapes; the first time this takes a few seconds.")
-        # Made anew by each server: another version of facegen makes another.
-        rig(key, path, sets=["units", "arkit", "visemes"])
+        path = make_folder(self.store.folder / _AVATARS) / f"{name}.glb"
+        if name not in self._made:
+            wait(f"{name} gets its blendshapes; the first time this takes a few seconds.")
+            # Made anew by each server: another version of facegen makes another.
+            rig(name, path, sets=["units", "arkit", "visemes"])
+            self._made.add(name)
         return load_face(path)

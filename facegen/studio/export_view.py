@@ -10,7 +10,7 @@ from facegen.errors import InputError
 from facegen.render.backends import RENDERERS
 from facegen.render.wishes import parse_size
 from facegen.studio.exports import FORMS, Made, Wish, export, form_of
-from facegen.studio.limits import MEBIBYTE
+from facegen.studio.limits import LIMITS, MEBIBYTE
 from facegen.studio.take_away import view_of
 from facegen.studio.task import Task
 from facegen.studio.work import Work
@@ -19,9 +19,6 @@ _SIZES = ("256", "512", "720", "1080", "1280x720", "1920x1080")
 _HERE, _FRONT = "as here", "from the front"
 _VIEWS = {_FRONT: (0.0, 0.0), "half from the subject's left": (40.0, 0.0), "from the subject's left": (90.0, 0.0)}
 _CLEAR = {"plain": "plain", "white": "white", "transparent": "transparent"}
-LARGEST = 512 * MEBIBYTE
-"""Bytes that are sent to a browser: it holds a file in memory until all of it is there."""
-
 
 class ExportView:
     """What, how large, how fast; a bar and a way to stop."""
@@ -63,7 +60,7 @@ class ExportView:
         def make(report: Any) -> tuple[Made, bytes]:
             with tempfile.TemporaryDirectory(prefix="facegen-studio-") as folder:
                 made = export(motion, form, Path(folder), name, wish, report, script=script)
-                if made.path.stat().st_size > LARGEST:
+                if made.path.stat().st_size > LIMITS.download_bytes:
                     raise InputError(f"size: the file has {made.path.stat().st_size / MEBIBYTE:.0f} MB, more than a "
                                      "browser takes at once; take a smaller size, or use the command facegen animate")
                 return made, made.path.read_bytes()

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import shutil
 import zipfile
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from facegen.animation.animated import save_animation
 from facegen.animation.clip import Clip
@@ -24,9 +27,12 @@ from facegen.jobs.frames import STAMP, save_clip
 from facegen.progress import Progress, counted, within
 from facegen.render.request import available_cores
 from facegen.studio import script_text
+from facegen.studio.limits import LIMITS, MEBIBYTE
 
 # Frames that are worth another process: it takes as long to start as so many small ones take to draw.
 _WORTH_A_PROCESS = 60
+# Bytes of a picture for each pixel of the square that the head stands in: 0.52 at 256 pixels, 0.17 at 1080.
+_BYTES = 0.5
 
 
 @dataclass(frozen=True)
@@ -94,12 +100,32 @@ def form_of(label: str) -> Form:
     return FORMS[label]
 
 
+def check_room(motion: Clip | Playback, form: Form, folder: Path, wish: Wish) -> None:
+    """Raise InputError for pictures that the disk or a browser cannot hold, estimated by their number and size, and for
+    more frames than a clip may have. A recording's own frames were bounded when it was opened."""
+    if form.kind in ("script", "sound") or (not form.is_drawn and isinstance(motion, Playback)):
+        return
+    frames = motion.frames(wish.fps)
+    if not form.is_drawn:
+        return
+    pictures, zipped = _BYTES * frames * min(wish.size) ** 2, form.kind == "frames"
+    free = shutil.disk_usage(folder).free / (4 if zipped else 2)        # packed, they are there twice
+    most, why = min((LIMITS.export_bytes, "the studio puts on the disk"), (free, "the disk has room for"),
+                    (LIMITS.download_bytes if zipped else np.inf, "a browser takes at once"))
+    if pictures > most:
+        raise InputError(f"size: {frames:,} pictures of {wish.size[0]} x {wish.size[1]} are about "
+                         f"{pictures / MEBIBYTE:,.0f} MB, more than {why} ({most / MEBIBYTE:,.0f}); take a smaller "
+                         "size or fewer pictures a second, or use the command facegen animate")
+
+
 def export(motion: Clip | Playback, form: Form, folder: Path, name: str, wish: Wish, progress: Progress, *,
            script: Any = None) -> Made:
     """Make a file in a folder and return it. script: the clip's own, for "Clip as text".
 
-    What ``progress`` raises stops the work; the folder is its owner's to remove. InputError, FileError.
+    What ``progress`` raises stops the work; the folder is its owner's to remove. InputError, FileError; see
+    `check_room`.
     """
+    check_room(motion, form, folder, wish)
     path = folder / f"{name}{form.suffix}"
     if form.kind == "film":
         save_clip(motion, path, **_drawing(motion, wish), progress=progress)
@@ -121,8 +147,7 @@ def export(motion: Clip | Playback, form: Form, folder: Path, name: str, wish: W
         if getattr(motion, "sound", None) is None:
             raise InputError("format: this clip has no sound; let it say something under Speech")
         return Made(save_wav(motion.sound, path))
-    progress("working out the frames", 0.0)
-    one = _performance(motion, wish.fps)
+    one = _performance(motion, wish.fps, within(progress, 0.0, 0.7))
     progress("writing", 0.7)
     if form.kind == "stream":
         return _streamed(one, path, wish.fps, within(progress, 0.7, 1.0))
@@ -130,8 +155,8 @@ def export(motion: Clip | Playback, form: Form, folder: Path, name: str, wish: W
     return Made(path, written.warnings)
 
 
-def _performance(motion: Clip | Playback, fps: float) -> Performance:
-    return clip_performance(motion, fps) if isinstance(motion, Clip) else motion.performance
+def _performance(motion: Clip | Playback, fps: float, progress: Progress) -> Performance:
+    return clip_performance(motion, fps, progress) if isinstance(motion, Clip) else motion.performance
 
 
 def _drawing(motion: Clip | Playback, wish: Wish) -> dict[str, Any]:

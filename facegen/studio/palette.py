@@ -19,7 +19,9 @@ from facegen.studio.work import FaceWork, Work
 
 _EMPTY = "data:image/gif;base64,R0lGODlhAQABAAAAACH5BAEKAAEALAAAAAABAAEAAAICTAEAOw=="
 _SHARE = 0.5            # of an expression that joins a mixture
-_KEPT = "thumbnails"
+
+KEPT = "thumbnails"
+"""Folder of all works that holds the pictures."""
 
 
 class Palette:
@@ -27,7 +29,7 @@ class Palette:
 
     def __init__(self, page: Page) -> None:
         self._page = page
-        self._thumbnails = Thumbnails(page.desk.store.folder / _KEPT, page.fault)
+        self._thumbnails = Thumbnails(page.desk.store.folder / KEPT, page.fault)
         self._person: Person | None = None
         self._rig: Any = None
         self._buttons: dict[str, Any] = {}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import replace
 from typing import Any
 
@@ -18,6 +19,7 @@ from facegen.studio.markers import BLUE, GREEN, ORANGE, Mark, Markers
 from facegen.studio.page import Page
 from facegen.studio.picking import place
 from facegen.studio.proposing import Advice, Adviser, adviser_of
+from facegen.studio.task import Stopped
 from facegen.studio.work import AvatarWork, Work
 
 _NEXT = "the next one"
@@ -279,7 +281,7 @@ class PickerView:
     # -- proposals ----------------------------------------------------------------------------------------------
     def _advise(self) -> Adviser:
         if self._adviser is None or self._adviser.mesh is not self.scene.mesh:
-            self._adviser = adviser_of(self.scene.mesh)
+            self._adviser = adviser_of(self.scene.mesh, self.scene.opened.path)
         return self._adviser
 
     def _think(self, avatar: AvatarWork) -> None:
@@ -291,7 +293,15 @@ class PickerView:
         adviser = self._advise()
         if not adviser.ready:                               # while a face is looked for mirroring says something
             self.proposals = adviser.first(avatar)
-        self._thinking.ask(lambda: self._advised(known, adviser.advice(avatar)))
+        self._thinking.ask(lambda: self._ask_for(avatar, known, adviser))
+
+    def _ask_for(self, avatar: AvatarWork, known: Any, adviser: Adviser) -> None:
+        def waits(seconds: float) -> None:
+            if self.page.closed or self._adviser is not adviser:    # another avatar has come
+                raise Stopped
+
+        with suppress(Stopped):
+            self._advised(known, adviser.advice(avatar, waits))
 
     def _advised(self, known: Any, advice: Advice) -> None:
         """Show advice, if the points are still those that it is of."""

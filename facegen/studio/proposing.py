@@ -6,18 +6,22 @@ import threading
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
+from facegen.errors import FileError
 from facegen.geometry.closest import ClosestPoints
 from facegen.geometry.mesh import Mesh
 from facegen.geometry.operators import Surface
 from facegen.landmarking.confidence import RECOGNISED
-from facegen.landmarking.propose import Proposer
+from facegen.landmarking.propose import Proposer, Searched
+from facegen.studio.apart import Waits, patient
 from facegen.studio.landmark_words import ORDER, partner
 from facegen.studio.picking import Place, as_landmarks, place, point
 from facegen.studio.placement import axes, nearest_axes
+from facegen.studio.reading import search_safely
 from facegen.studio.work import AvatarWork
 from facegen.transfer.landmark_checks import place_faults
 
@@ -48,19 +52,21 @@ class Advice:
 
 
 @lru_cache(maxsize=4)       # finding a face takes seconds, and a page that is loaded again has the same mesh
-def adviser_of(mesh: Mesh) -> Adviser:
+def adviser_of(mesh: Mesh, path: Path) -> Adviser:
     """Return the adviser of a mesh, the same for all who ask."""
-    return Adviser(mesh)
+    return Adviser(mesh, path)
 
 
 class Adviser:
     """What is known of one avatar's mesh; made once, asked after each step. ``ready``: whether `advice` is quick.
 
-    Threads take turns.
+    path: the avatar's file, read again by the process that looks for a face. Threads take turns.
     """
 
-    def __init__(self, mesh: Mesh) -> None:
-        self.mesh = mesh
+    def __init__(self, mesh: Mesh, path: Path) -> None:
+        self.mesh, self._path = mesh, path
+        self._proposer: Proposer | None = None
+        self._odd: tuple[str, ...] = ()             # what went wrong when a face was looked for
         self.ready = False
         self._lock = threading.Lock()
         used = mesh.vertices[np.unique(mesh.faces)]
@@ -69,10 +75,6 @@ class Adviser:
     @cached_property
     def _closest(self) -> ClosestPoints:
         return ClosestPoints(Surface(self.mesh.vertices, self.mesh.faces))
-
-    @cached_property
-    def _proposer(self) -> Proposer:
-        return Proposer(self.mesh)
 
     def first(self, work: AvatarWork) -> Advice:
         """Return at once what mirroring says: the face is still being looked for."""
@@ -83,10 +85,15 @@ class Adviser:
                 found[pair] = self.mirrored(work, name, one)
         return Advice(found, dict.fromkeys(found, _MIRRORED))
 
-    def advice(self, work: AvatarWork) -> Advice:
-        """Return what the points of a work say of the others; the first time takes seconds."""
+    def advice(self, work: AvatarWork, waits: Waits = patient) -> Advice:
+        """Return what the points of a work say of the others; the first time takes seconds.
+
+        waits: see `facegen.studio.apart.ask`.
+        """
         known = {name: (one["face"], tuple(one["barycentric"])) for name, one in work.landmarks.items()}
         with self._lock:
+            if self._proposer is None:
+                self._proposer = Proposer(self.mesh, self._searched(waits))
             proposed = self._proposer.propose(known)
         self.ready = True
         guesses = {name: proposed[name] for name in ORDER if name in proposed and name not in known
@@ -95,7 +102,15 @@ class Adviser:
         return Advice({name: place(one.face, one.barycentric) for name, one in guesses.items()},
                       {name: one.confidence for name, one in guesses.items()}, proposed.ask, proposed.face,
                       nearest_axes(proposed.frame.rotation.T) if proposed.face >= FOUND and proposed.frame else None,
-                      errors, tuple(each for each in proposed.warnings if each not in errors))
+                      errors, (*self._odd, *(each for each in proposed.warnings if each not in errors)))
+
+    def _searched(self, waits: Waits) -> Searched:
+        try:
+            return search_safely(self._path, waits=waits)
+        except FileError:                           # as the path is nobody's business, it is said here
+            self._odd = ("No face could be looked for: it takes too long or too much. Place some points, and the "
+                         "others are proposed.",)
+            return Searched()
 
     def _errors(self, work: AvatarWork) -> tuple[str, ...]:
         """Return what must be wrong about the points of a work, a sentence each."""

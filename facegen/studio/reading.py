@@ -1,135 +1,94 @@
-"""A stranger's avatar, read in a process of its own: with little memory, for a short time, and nothing of it stays.
+"""What is done with strangers' files in a process of its own (`facegen.studio.apart`): avatars and recordings are read,
+faces on avatars are looked for.
 
-The readers of facegen.fileio check what they read. This is for what they might not know: a file that makes them slow or
-hungry ends its own process, and no page.
+The readers of facegen.fileio and facegen.animation.streams check what they read. This is for what they might not know:
+a file that makes them slow or hungry ends its own process, and no page. Looking for a face takes so long that other
+pages would notice.
 """
 
 from __future__ import annotations
 
-import contextlib
-import io
-import json
-import math
 import os
-import pickle
-import subprocess
-import sys
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-import facegen
-from facegen.errors import FileError
+from facegen.animation.performance import Performance
+from facegen.errors import FileError, InputError
 from facegen.fileio.avatar import READABLE, AvatarFile, load_avatar
-from facegen.studio.limits import MEBIBYTE, Limits
+from facegen.studio.apart import Waits, Wish, ask, patient
+from facegen.studio.limits import LIMITS, Limits
 
-_CPU_SIGNAL = 24            # SIGXCPU, which ends a process after its time
-_START = 10.0               # seconds that a process may need until it reads, on a machine that is busy
-_PROGRAM = """import sys
-sys.path.append(sys.argv[1])
-from facegen.studio import reading
-reading.answer()"""
-# What the answer of the other process may be made of: it read a stranger's file, and is not trusted more than that.
-_CLASSES = {("pathlib", "PosixPath"), ("pathlib", "WindowsPath"), ("pathlib", "PurePosixPath"), ("builtins", "set"),
-            ("numpy", "ndarray"), ("numpy", "dtype"), ("numpy.core.multiarray", "_reconstruct"),
-            ("numpy._core.multiarray", "_reconstruct"), ("numpy._core.numeric", "_frombuffer"),
-            ("numpy.core.numeric", "_frombuffer"), ("numpy._core.multiarray", "scalar"),
-            ("numpy.core.multiarray", "scalar"), ("builtins", "frozenset")}
-_OURS = ("facegen.fileio.", "facegen.geometry.mesh")
+if TYPE_CHECKING:
+    from facegen.landmarking.propose import Searched
+
+STREAM = ".fgp"
+"""What the name of a recording in facegen's few bits ends in."""
+
+_WAIT = 16              # packets that a missing one is waited for, as the command does
 
 
-def read_avatar_safely(path: str | os.PathLike[str], limits: Limits | None = None) -> AvatarFile:
+def read_avatar_safely(path: str | os.PathLike[str], limits: Limits = LIMITS, waits: Waits = patient
+                       ) -> AvatarFile:
     """Return what `facegen.load_avatar` returns, read by another process with bounds on its time and memory.
 
-    Raises FileError for a file that is wrong, has more triangles than ``limits.triangles``, takes too long or too much.
+    waits: see `facegen.studio.apart.ask`. Raises FileError for a file that is wrong, has more triangles than
+    ``limits.triangles``, takes too long or too much.
     """
     path = Path(path)
     if path.suffix.lower() not in READABLE:
         return load_avatar(path)        # which says what it reads
-    return _Answers(io.BytesIO(_asked(path, limits or Limits()))).load()
+    return ask("avatar", path, limits, {"triangles": limits.triangles}, waits)
 
 
-def _asked(path: Path, limits: Limits) -> bytes:
-    """Have another process read a file; return its answer, or raise the error that it tells of."""
-    wish = json.dumps({"path": str(path), "triangles": limits.triangles, "seconds": limits.read_seconds,
-                       "bytes": limits.read_bytes})
-    environment = {**os.environ, "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "PYTHONWARNINGS": "ignore",
-                   "PYTHONDONTWRITEBYTECODE": "1"}
-    try:        # -P: nothing is imported from the folder that the studio was started in
-        done = subprocess.run([sys.executable, "-P", "-c", _PROGRAM, str(Path(facegen.__file__).parents[1])],
-                              input=wish.encode(), capture_output=True, check=False, env=environment,
-                              timeout=limits.read_seconds + _START)
-    except subprocess.TimeoutExpired:
-        raise _too_slow(path, limits) from None
-    mark, _, rest = done.stdout.partition(b"\n")
-    if mark == b"found" and done.returncode == 0:
-        return rest
-    if mark == b"error" and done.returncode == 0:
-        from facegen import errors
+def read_recording_safely(path: Path, limits: Limits, *, fps: float | None = None, person: str | None = None,
+                          calibrate: str = "", calibrate_head: bool = False, smooth: str = "",
+                          waits: Waits = patient) -> Performance:
+    """Return what `facegen.load_performance` returns, or a stream's performance, read by another process.
 
-        told = json.loads(rest)
-        kind = getattr(errors, told["kind"], FileError)
-        raise kind(told["text"])
-    if done.returncode == -_CPU_SIGNAL:
-        raise _too_slow(path, limits)
-    raise FileError(f"{path}: cannot be read: it needs more than {limits.read_bytes // MEBIBYTE} MiB, or makes "
-                    "its reader fail")
+    calibrate, calibrate_head, smooth: see `cleaned`. waits: see `facegen.studio.apart.ask`. Raises FileError or
+    InputError for a file that is wrong, lasts longer or holds more than ``limits`` say, takes too long or too much.
+    """
+    wish = {"fps": fps, "person": person, "seconds": limits.recorded_seconds, "frames": limits.frames,
+            "numbers": limits.numbers,
+            "clean": {"calibrate": calibrate, "calibrate_head": calibrate_head, "smooth": smooth}}
+    return ask("recording", path, limits, wish, waits)
 
 
-def _too_slow(path: Path, limits: Limits) -> FileError:
-    return FileError(f"{path}: cannot be read within {limits.read_seconds:.0f} s")
+def search_safely(path: Path, limits: Limits = LIMITS, waits: Waits = patient) -> Searched:
+    """Return what `facegen.Proposer.search` finds on the avatar of a file, looked for by another process.
+
+    waits: see `facegen.studio.apart.ask`. Raises FileError for what takes longer than ``limits.search_seconds``.
+    """
+    return ask("search", path, replace(limits, read_seconds=limits.search_seconds), {}, waits)
 
 
-class _Answers(pickle.Unpickler):
-    """Reads an answer that is made of nothing but an avatar."""
+def cleaned(plain: Performance, *, calibrate: str = "", calibrate_head: bool = False, smooth: str = "") -> Performance:
+    """Return a recording less its resting face and smoothed, as `facegen.studio.work.ClipWork` says; "" for not.
 
-    def find_class(self, module: str, name: str) -> Any:
-        if (module, name) in _CLASSES or module.startswith(_OURS):
-            found = super().find_class(module, name)
-            if isinstance(found, type) or not module.startswith(_OURS):
-                return found
-        raise pickle.UnpicklingError(f"{module}.{name} is no part of an avatar")
+    InputError.
+    """
+    from facegen.animation.streams.calibrate import calibrated, parse_calibration
+    from facegen.animation.streams.smooth import OneEuro, smoothed
+
+    if calibrate:
+        plain = calibrated(plain, parse_calibration(calibrate, head=calibrate_head))
+    euro = OneEuro.of(smooth or None)
+    return plain if euro is None else smoothed(plain, euro)
 
 
 # In the other process
 
-def answer() -> None:
-    """Read what stdin asks for and write it to stdout; the main function of the other process."""
-    wish = json.loads(sys.stdin.read())
-    _bound(wish["seconds"], wish["bytes"])
-    out = sys.stdout.buffer
-    sys.stdout = sys.stderr         # nothing else may write there
-    path = Path(wish["path"])
-    try:
-        found = b"found\n" + _avatar(path, wish["triangles"])
-    except MemoryError:
-        sys.exit(3)
-    except FileError as error:
-        found = _error("FileError", error)
-    except Exception as error:
-        from facegen.errors import FacegenError
-
-        if isinstance(error, FacegenError):
-            found = _error(type(error).__name__, error)
-        else:
-            found = _error("FileError", FileError(f"{path}: cannot be read ({type(error).__name__})"))
-    out.write(found)
-    out.flush()
-
-
-def _error(kind: str, error: Exception) -> bytes:
-    return b"error\n" + json.dumps({"kind": kind, "text": str(error)[:2000]}).encode()
-
-
-def _avatar(path: Path, most: int) -> bytes:
+def _avatar(path: Path, wish: Wish) -> AvatarFile:
     from facegen.studio.counting import triangles
 
-    count = triangles(path)
+    count, most = triangles(path), wish["triangles"]
     if count is not None and count > most:
         raise _too_many(path, count, most)
     found = load_avatar(path)
     if len(found.mesh.faces) > most:
         raise _too_many(path, len(found.mesh.faces), most)
-    return pickle.dumps(found, protocol=5)
+    return found
 
 
 def _too_many(path: Path, count: int, most: int) -> FileError:
@@ -137,15 +96,40 @@ def _too_many(path: Path, count: int, most: int) -> FileError:
                      "Blender: the Decimate modifier), or use the command facegen rig")
 
 
-def _bound(seconds: float, size: int) -> None:
-    """Bound what this process may use, where the system can; the time is bounded by who waits for it, too."""
-    try:
-        import resource
-    except ImportError:             # Windows
-        return
-    for name, bound in (("RLIMIT_AS", size), ("RLIMIT_CPU", math.ceil(seconds)), ("RLIMIT_CORE", 0),
-                        ("RLIMIT_FSIZE", 0), ("RLIMIT_NPROC", 0)):
-        if hasattr(resource, name):
-            hard = bound + (name == "RLIMIT_CPU")       # the first bound has a signal of its own, the second kills
-            with contextlib.suppress(ValueError, OSError):      # a lower bound stands already
-                resource.setrlimit(getattr(resource, name), (bound, hard))
+def _recording(path: Path, wish: Wish) -> Performance:
+    found = _performance(path, wish["fps"], wish["person"])
+    columns = [found.weights, *(one for one in (found.head, found.place, found.gaze) if one is not None),
+               *found.extra.values()]
+    for said, has, most in (
+            (f"lasts {found.duration / 3600:.1f} hours, the timeline takes up to {wish['seconds'] / 3600:.0f}",
+             found.duration, wish["seconds"]),
+            (f"has {len(found):,} frames, the timeline takes up to {wish['frames']:,}", len(found), wish["frames"]),
+            (f"holds {sum(one.size for one in columns):,} numbers, the studio takes up to {wish['numbers']:,}",
+             sum(one.size for one in columns), wish["numbers"])):
+        if has > most:
+            raise InputError(f"{path}: {said}; cut it, or use the command facegen play")
+    return cleaned(found, **wish["clean"])
+
+
+def _performance(path: Path, fps: float | None, person: str | None) -> Performance:
+    if path.suffix.lower() != STREAM:
+        from facegen.animation.streams import load_performance
+
+        return load_performance(path, fps=fps, person=person)
+    from facegen.codec.decoder import Decoder
+    from facegen.codec.link import read_stream
+    from facegen.codec.recording import performance_of
+
+    decoder = Decoder(wait=_WAIT)
+    with open(path, "rb") as file:
+        return performance_of(decoder, list(read_stream(decoder, file)))
+
+
+def _search(path: Path, wish: Wish) -> Any:
+    from facegen.landmarking.propose import Proposer
+
+    return Proposer(load_avatar(path).mesh).search()
+
+
+JOBS = {"avatar": _avatar, "recording": _recording, "search": _search}
+"""What the other process can be asked for."""

@@ -11,7 +11,7 @@ from facegen.errors import FacegenError
 from facegen.studio import recordings
 from facegen.studio.latest import Latest
 from facegen.studio.picking import words_for
-from facegen.studio.task import Task
+from facegen.studio.task import Stopped, Task, while_read
 from facegen.studio.work import ClipWork, Work
 
 _NO, _SECONDS, _PERCENT = "no", "by seconds of rest", "by what it mostly is"
@@ -31,7 +31,8 @@ class RecordingView:
         self._key: Any = None                       # of what is read
         self._fault = ""
         self._rig: Any = None                       # for which the warnings are
-        self._task: Task | None = None
+        self._task: Task | None = None              # what reads the file that came last
+        self._at_work = 0                           # files that are read, or whose reading is being stopped
         self._reading = Latest("recording", self._page.fault)
         calls = self._page.calls
         self._told = gui.add_markdown(_HELP)
@@ -102,7 +103,9 @@ class RecordingView:
     def _read(self, clip: ClipWork, key: Any) -> None:
         """Read what is kept; runs beside the page."""
         try:
-            found, fault = Playback(recordings.load(self._host.folder, clip)), ""
+            found, fault = Playback(recordings.load(self._host.folder, clip, self._still_wanted)), ""
+        except Stopped:
+            return
         except FacegenError as error:
             found, fault = None, str(error)
         with self._page.lock:
@@ -111,22 +114,27 @@ class RecordingView:
                 self._show(clip, self._page.rig)
                 self._host.refresh(self._page.work)
 
+    def _still_wanted(self, seconds: float) -> None:
+        if self._reading.replaced:
+            raise Stopped
+
     # -- what is done -------------------------------------------------------------------------------------------
     def _uploaded(self) -> None:
-        if self._task is not None:
-            return
+        if self._task is not None:                  # of two that are opened, the second
+            self._task.stop()
         given, clip = self._upload.value, replace(self._page.work.clip, calibrate="", smooth="", face_id="")
 
         def read(report: Any) -> tuple[str, Performance]:
-            report("reading", 0.2)
-            return recordings.keep(self._host.folder, given.name, given.content, clip)
+            return recordings.keep(self._host.folder, given.name, given.content, clip, while_read(report))
 
+        self._at_work += 1
         self._place.visible = True
         with self._place:
             self._task = Task(self._page, given.name[:60], read, lambda made: self._opened(clip, *made), self._ended)
 
     def _ended(self) -> None:
-        self._task, self._place.visible = None, False
+        self._at_work -= 1
+        self._place.visible = self._at_work > 0
 
     def _opened(self, clip: ClipWork, name: str, found: Performance) -> None:
         clip = replace(clip, recording=name, shown="recording")

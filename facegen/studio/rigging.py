@@ -6,7 +6,7 @@ import hashlib
 import json
 import threading
 from collections.abc import Callable, Mapping
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +14,9 @@ from numpy.typing import NDArray
 
 from facegen.errors import InputError
 from facegen.face.avatar import AvatarFace
+from facegen.facs.expressions import Resolution
 from facegen.fileio.textfile import make_folder, save_text
+from facegen.geometry.mesh import Mesh
 from facegen.jobs.preview import save_preview
 from facegen.studio.avatar_checks import set_names
 from facegen.studio.avatar_file import FOLDER, Opened
@@ -72,6 +74,18 @@ class RigMaker:
                                    lid_closure=work.lid_closure)
         return posed(opened.avatar.mesh.vertices, found, weights), found
 
+    def shown(self, work: AvatarWork, opened: Opened, face: AvatarFace, meaning: Resolution
+              ) -> tuple[Mesh, Transferred]:
+        """Return the avatar's own mesh, mm, as the work's choices make it show something, and how its shapes were made.
+
+        face: the avatar with blendshapes as its file was last made, which says what the shapes are for.
+        """
+        vertices, found = self.tune(work, opened, face.shape_weights(meaning))
+        own = opened.avatar.mesh
+        rest = own.with_vertices(found.frame.apply(own.vertices))
+        vertices = face.turned(vertices, face.head_angles(meaning), rest)
+        return replace(own, vertices=vertices, colours=opened.avatar.vertex_colours), found
+
     def path(self, opened: Opened) -> Path:
         """Return where the avatar with blendshapes is or will be."""
         return self.folder / FACES / opened.output
@@ -99,7 +113,7 @@ class RigMaker:
             marks = make_folder(self.folder / FOLDER) / f"{opened.output}.landmarks.yaml"
             save_text(file_text(work, opened.avatar.digest), marks)
             try:
-                made = Rigging(opened.path, landmarks=marks, sets=set_names(work.sets), pieces=dict(work.pieces))
+                made = Rigging(opened.avatar, landmarks=marks, sets=set_names(work.sets), pieces=dict(work.pieces))
             except InputError as error:             # of a file that the person never sees
                 raise InputError(words_for(str(error).removeprefix(f"{marks}: "))) from None
             self._laid = now, made

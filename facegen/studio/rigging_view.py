@@ -191,21 +191,19 @@ class RiggingView:
     def _tune_to(self, avatar: AvatarWork, opened: Any, face: AvatarFace, meaning: Any) -> None:
         """Show what the choices make of an expression; runs beside the page."""
         try:
-            vertices, found = self.maker.tune(avatar, opened, face.shape_weights(meaning))
+            mesh, found = self.maker.shown(avatar, opened, face, meaning)
         except FacegenError as error:
             self.page.fault(error)
             return
-        vertices = face.turned(vertices, face.head_angles(meaning)) if len(vertices) == len(face.mesh().vertices) \
-            else vertices
         with self.page.lock:
             if self.page.work.avatar is not avatar or not self.compares:
                 return
-            if len(self.page.stage.figures[RIGGED].vertices) != len(vertices):
-                self._stand(replace(opened.avatar.mesh, vertices=vertices, colours=opened.avatar.vertex_colours))
+            if len(self.page.stage.figures[RIGGED].vertices) != len(mesh.vertices):
+                self._stand(mesh)
             names = ", ".join(found.fresh[:6]) + (" ..." if len(found.fresh) > 6 else "")
             self.tuning.told.content = (f"Computed anew for this picture: {names or 'nothing'}. **Make blendshapes "
                                         "again** writes the file.")
-            self.page.stage.request(RIGGED, lambda: vertices)
+            self.page.stage.request(RIGGED, lambda: mesh.vertices)
 
     def _compared(self) -> None:
         self.page.refresh()

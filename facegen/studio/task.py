@@ -13,6 +13,18 @@ from facegen.studio.page import Page
 _LINGERS = 3.0
 
 
+_PATIENCE = 20.0        # seconds of reading after which its bar stands at half
+
+
+def while_read(report: Callable[..., None]) -> Callable[[float], None]:
+    """Return what `facegen.studio.apart.ask` calls while it waits: the person sees that it goes on, and can stop it."""
+    def waits(seconds: float) -> None:
+        report("reading" + (f", {seconds:.0f} s" if seconds >= 2.0 else ""), seconds / (seconds + _PATIENCE))
+
+    waits(0.0)
+    return waits
+
+
 class Stopped(Exception):
     """Raised inside a job whose person pressed stop."""
 

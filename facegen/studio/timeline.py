@@ -16,9 +16,10 @@ from typing import Any
 from facegen.animation.clip import LONGEST, Clip
 from facegen.animation.script import load_clip
 from facegen.animation.timing import load_timing
-from facegen.errors import InputError
+from facegen.errors import InputError, TableError
 from facegen.facs.expression_table import Person, load_expressions
 from facegen.facs.validate import Entry
+from facegen.studio.limits import LIMITS
 
 NEW = "new"
 """The name of a track that is not there yet."""
@@ -78,6 +79,10 @@ def check_form(script: object) -> None:
             raise entry.fail("a track has either keyframes or events or speech; write a track for each")
         if kinds[0] in _WHEN:
             _check_items(inner[kinds[0]], kinds[0])
+    count = sum(len(one.items) for one in tracks(script))
+    if count > LIMITS.items:
+        raise TableError(f"clip: has {count:,} keys and events, the timeline takes up to {LIMITS.items:,}; the command "
+                         "facegen animate takes any number")
 
 
 def _check_items(several: Entry, kind: str) -> None:

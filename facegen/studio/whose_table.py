@@ -12,6 +12,7 @@ from facegen.facs.person_file import Change, person_change, read_person_data
 from facegen.facs.yamlfile import read_data
 from facegen.fileio.textfile import make_folder
 from facegen.studio import table_edit as edit
+from facegen.studio.limits import LIMITS
 from facegen.studio.page import Page
 from facegen.studio.work import TableWork
 
@@ -91,7 +92,7 @@ class WhoseTable:
 
     def _uploaded(self) -> None:
         file = self._upload.value
-        data = read_person_data(file.content, file.name)
+        data = read_person_data(file.content, file.name, most=LIMITS.habits)
         stem = file.name.rpartition(".")[0] or file.name
         self._put(f"open {file.name}", TableWork(edit.file_name(stem), {"name": stem, **data}))
         self.page.say("It is kept here when you save it.", f"{file.name} is open")

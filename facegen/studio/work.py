@@ -15,13 +15,15 @@ from facegen.animation.streams.smooth import OneEuro
 from facegen.animation.streams.times import check_fps
 from facegen.errors import InputError, TableError
 from facegen.face.gaze import look_at
-from facegen.facs.deformation import Deformation, deformation_from_dict, weighted_sum
+from facegen.facs.deformation import Deformation, deformation_from_dict
 from facegen.facs.expression_table import HABITS, Person, person_from_data
 from facegen.facs.expressions import Resolution, resolve
 from facegen.facs.notation import canonical
+from facegen.facs.person_file import check_count
 from facegen.facs.tables import load_units
 from facegen.facs.validate import Entry
 from facegen.studio.avatar_checks import check_avatar
+from facegen.studio.limits import LIMITS
 from facegen.studio.recordings import safe_name
 from facegen.studio.timeline import check_form
 
@@ -101,11 +103,9 @@ class FaceWork:
 def _gazing(found: Resolution, raw: Deformation, gaze: Mapping[str, float], rig: Any) -> Resolution:
     """Return the meaning with other eyes: they look at a point, whatever units and raw data say of them."""
     units, raw = replace(found.deformation, eyes={}), replace(raw, eyes={})
-    head = weighted_sum([(1.0, Deformation(head=one.head)) for one in (units, raw)]).head
-    turned = [head.get(key, 0.0) for key in ("yaw", "pitch", "roll")]
-    eyes = look_at(rig, [gaze[axis] for axis in "xyz"], head=[*turned, 0.0])
-    more = (one for one in (raw, Deformation(eyes=eyes)) if one)
-    return replace(found, deformation=units, more=(*found.more, *more))
+    found = replace(found, deformation=units, more=(*found.more, *([raw] if raw else ())))
+    eyes = look_at(rig, [gaze[axis] for axis in "xyz"], head=rig.head_angles(found))
+    return replace(found, more=(*found.more, Deformation(eyes=eyes)))
 
 
 def _turns_eyes(code: str) -> bool:
@@ -194,6 +194,7 @@ class TableWork:
 
     def checked(self) -> Self:
         """Return itself, or raise InputError."""
+        check_count(self.data, LIMITS.habits, self.file or "table")
         load_units().own_basis(self.person)
         return self
 

@@ -14,6 +14,7 @@ from facegen.blendshapes.recipes import shape_set
 from facegen.errors import InputError, TableError
 from facegen.face.avatar import AvatarFace
 from facegen.face.face import Face, load_face
+from facegen.facs.deformation import Deformation
 from facegen.facs.expression_table import load_expressions
 from facegen.facs.expressions import resolve
 from facegen.facs.tables import load_units
@@ -313,3 +314,19 @@ def test_threads_may_pose_one_avatar(rig_of, monkeypatch):
     with ThreadPoolExecutor(4) as pool:
         for got, right in zip(pool.map(shared.pose, poses), expected, strict=True):
             assert np.array_equal(got, right)
+
+
+@pytest.mark.parametrize("length", ["millimetre", "face"])
+def test_a_head_that_is_turned_by_hand_turns_and_moves_no_shape(units, length):
+    """Movements beside the units come as ``more``, as the studio's do."""
+    forward = 4.0 if length == "millimetre" else 0.1
+    by_hand = Deformation(head={"yaw": 15.0, "roll": 5.0, "forward": forward}, jaw={"open": 6.0}, units=length)
+    found = replace(resolve("12D+55C"), more=(by_hand,))
+    head = units.head_angles(found)
+    assert head == pytest.approx(load_face().head_angles(found))
+    assert head[:3] == pytest.approx([15.0, 0.0, 5.0 + resolve("55C").deformation.head["roll"]])
+    still = replace(found, deformation=replace(found.deformation, head={}), more=(replace(by_hand, head={}),))
+    assert units.shape_weights(found) == units.shape_weights(still)
+    assert units.pose(found) == pytest.approx(units.turned(units.pose(still), head), abs=1e-9)
+    away = np.linalg.norm(units.pose(found) - load_face().pose(found, detail=DETAIL), axis=1)
+    assert np.median(away) < 0.5

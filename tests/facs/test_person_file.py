@@ -148,3 +148,16 @@ def test_shipped_people_can_be_read_and_changed():
         changed, kept = changed_text(text, new)
         assert kept
         assert changed.startswith(text)
+
+
+def test_habits_are_counted_before_they_are_read():
+    """Half a megabyte of them takes ten seconds to read: whoever serves others says how many it takes."""
+    head = "about: a\nsource: b\n"
+    text = head + "adds: {maybe: {units: 14C, about: c, also: [perhaps, hm]}}\nunits: {12: {scale: 0.5}}\n" \
+        "aliases: {glee: happiness}\n"
+    assert read_person_data(text.encode(), "a.yaml", most=5)["aliases"] == {"glee": "happiness"}
+    with pytest.raises(InputError, match=r"^a.yaml: has 5 habits .* expected up to 4"):
+        read_person_data(text.encode(), "a.yaml", most=4)
+    for wrong in ("[]", "adds: 3", head + "adds: [1]", head + "adds: {a: 1}", head + "adds: {a: {also: {}}}"):
+        with pytest.raises(TableError):
+            read_person_data(wrong.encode(), "a.yaml", most=4)

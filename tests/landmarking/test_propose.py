@@ -1,12 +1,14 @@
 """Proposed landmarks: laws that hold on any head, and what is refused."""
 
+import pickle
+
 import numpy as np
 import pytest
 
 from facegen.errors import InputError
 from facegen.face.landmarks import REQUIRED
 from facegen.geometry.mesh import Mesh
-from facegen.landmarking.propose import Proposer, propose_landmarks
+from facegen.landmarking.propose import Proposer, Searched, propose_landmarks
 
 SIX = ("eye_outer_L", "eye_outer_R", "nose_tip", "mouth_corner_L", "mouth_corner_R", "chin")
 
@@ -30,6 +32,28 @@ def test_every_required_place_of_a_human_is_proposed_from_none(human):
     assert found.ask == "eye_outer_L"
     assert found.face == 1.0
     assert not found.warnings
+
+
+def test_what_was_searched_for_in_another_process_is_as_good_as_ones_own(human):
+    """Through bytes, as it comes from there; nothing is looked for again."""
+    proposer, true = human
+    other = Proposer(proposer.mesh, pickle.loads(pickle.dumps(proposer.search())))
+    for known in ({}, {"nose_tip": true["nose_tip"]}, {name: true[name] for name in SIX}):
+        here, there = proposer.propose(known), other.propose(known)
+        assert (there.face, there.ask, there.warnings) == (here.face, here.ask, here.warnings)
+        assert list(there) == list(here)
+        for name in here:
+            assert there[name].face == here[name].face
+            assert there[name].confidence == here[name].confidence
+            np.testing.assert_array_equal(there[name].barycentric, here[name].barycentric)
+
+
+def test_where_no_face_was_found_known_places_still_propose(human):
+    proposer, true = human
+    blind = Proposer(proposer.mesh, Searched())
+    assert not blind.propose({}).places
+    found = blind.propose({name: true[name] for name in SIX})
+    assert np.median(share(found, true)) < 0.1
 
 
 def test_a_place_lies_on_its_triangle_and_has_a_confidence(human):

@@ -40,6 +40,14 @@ def viser():
 
 
 @pytest.fixture
+def read_here(monkeypatch):
+    """What strangers sent is read in this process: test_reading.py has the other, that takes a second each."""
+    from facegen.studio import reading
+
+    monkeypatch.setattr(reading, "ask", lambda job, path, limits, wish, waits=None: reading.JOBS[job](path, wish))
+
+
+@pytest.fixture
 def serve(viser, tmp_path, monkeypatch):
     """A function that starts a server on a free port, in a folder of its own, and stops it after the test.
 
@@ -140,8 +148,14 @@ def shots(tmp_path_factory) -> Path:
     return folder
 
 
+@pytest.fixture(scope="session")
+def thumbnails(tmp_path_factory) -> Path:
+    """Where the pictures of expressions are kept: drawn once, not by each test beside what it looks at."""
+    return tmp_path_factory.mktemp("thumbnails")
+
+
 @pytest.fixture
-def studio(viser, tmp_path):
+def studio(viser, tmp_path, thumbnails):
     """A function that runs the whole studio on a free port, its works in a folder of its own: ``studio() -> Studio``.
 
     ``browser_page(studio().server)`` opens it.
@@ -150,8 +164,13 @@ def studio(viser, tmp_path):
 
     def start(**options):
         from facegen.studio.app import Studio
+        from facegen.studio.palette import KEPT
 
-        made = Studio(tmp_path / "works", **{"port": 0, **options})
+        works = tmp_path / "works"
+        works.mkdir(exist_ok=True)
+        if not (works / KEPT).exists():
+            (works / KEPT).symlink_to(thumbnails)
+        made = Studio(works, **{"port": 0, **options})
         running.append(made)
         made.start()
         return made

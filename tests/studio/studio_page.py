@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 import io
 import re
 import time
@@ -27,7 +28,15 @@ _FRAMES = """() => new Promise(done => {
     const next = () => --left ? requestAnimationFrame(next) : done()
     requestAnimationFrame(next)
 })"""
-_ONLY_CANVAS = "body * {visibility: hidden !important} canvas {visibility: visible !important}"
+# What is drawn, in the size in which it is seen: a screenshot without the panel would lay out all of the panel anew.
+_PIXELS = """canvas => {
+    const copy = document.createElement("canvas"), box = canvas.getBoundingClientRect()
+    copy.width = Math.round(box.width)
+    copy.height = Math.round(box.height)
+    const draw = copy.getContext("2d")
+    draw.drawImage(canvas, 0, 0, copy.width, copy.height)
+    return copy.toDataURL()
+}"""
 
 
 def difference(one: np.ndarray, other: np.ndarray) -> float:
@@ -72,6 +81,10 @@ class StudioPage:
         self.page.reload()
         return self.drawn()
 
+    def close(self) -> None:
+        """Go away: a page that is open draws all the time, and others wait for it."""
+        self.page.close()
+
     @property
     def work(self) -> str:
         """The id of the page's work."""
@@ -91,8 +104,8 @@ class StudioPage:
 
     def pixels(self) -> np.ndarray:
         """The canvas as it is now, without the panel: (rows, columns, 3) uint8."""
-        shot = self.canvas.screenshot(style=_ONLY_CANVAS, animations="disabled")
-        return np.asarray(Image.open(io.BytesIO(shot)).convert("RGB"))
+        shot = self.canvas.evaluate(_PIXELS).partition(",")[2]
+        return np.asarray(Image.open(io.BytesIO(base64.b64decode(shot))).convert("RGB"))
 
     def still(self, seconds: float = SECONDS) -> np.ndarray:
         """The canvas once two looks at it, a while and some drawn frames apart, are the same."""
@@ -147,7 +160,7 @@ class StudioPage:
         """What a slider stands at."""
         return float(self.slider(label).get_attribute("aria-valuenow"))
 
-    def drag_slider(self, label: str, to: float, steps: int = 6) -> None:
+    def drag_slider(self, label: str, to: float, steps: int = 3) -> None:
         """Drag a slider's thumb to a fraction 0..1 of its way, as a hand does."""
         thumb = self.slider(label)
         thumb.scroll_into_view_if_needed()

@@ -46,7 +46,7 @@ class RawPage:
         self.socket = connect(f"ws://127.0.0.1:{port}" + (path if path is not None else f"/w/{work}"),
                               origin=f"http://127.0.0.1:{port}" if origin == "" else origin,
                               additional_headers=dict(headers or {}), subprotocols=[protocol], compression=None,
-                              max_size=None, open_timeout=20, proxy=None)
+                              max_size=None, open_timeout=20, close_timeout=1, proxy=None)
 
     def send(self, *messages: Mapping[str, Any]) -> None:
         """Send messages as viser's page does, one each."""

@@ -7,7 +7,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from facegen.errors import FileError, InputError
-from facegen.fileio.avatar import load_avatar
 from facegen.studio import avatar_file
 from facegen.studio.avatar_file import (
     FOLDER,
@@ -21,6 +20,8 @@ from facegen.studio.avatar_file import (
 )
 from facegen.studio.limits import Limits
 from facegen.transfer.rig import avatar_files, avatar_names
+
+pytestmark = pytest.mark.usefixtures("read_here")
 
 TRIANGLE = b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"
 _PLY = (b"ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
@@ -98,9 +99,7 @@ def test_shipped_avatars_are_opened_by_name(name, tmp_path):
     ("a.vrm", TRIANGLE, "vrm"),
     ("a.gltf", b'{"asset": {"version": "2.0"}, "buffers": [{"uri": "../../etc/passwd", "byteLength": 9}]}', "gltf"),
 ])
-def test_hostile_files_are_refused_and_leave_nothing(tmp_path, monkeypatch, name, content, said):
-    # In this process: test_reading.py has the other, that takes a second each.
-    monkeypatch.setattr(avatar_file, "read_avatar_safely", lambda path, limits: load_avatar(path))
+def test_hostile_files_are_refused_and_leave_nothing(tmp_path, name, content, said):
     keep(tmp_path, "good.obj", TRIANGLE)
     with pytest.raises(InputError, match=said) as refused:
         keep(tmp_path, name, content)

@@ -21,6 +21,8 @@ from facegen.studio.picking import as_places, point
 from facegen.transfer.landmarks import load_landmarks
 from facegen.transfer.rig import avatar_files
 
+pytestmark = pytest.mark.usefixtures("read_here")
+
 NAME = "work-of-one"
 
 
@@ -69,7 +71,7 @@ class Blind:
 
     found: ClassVar = {}
 
-    def __init__(self, mesh):
+    def __init__(self, mesh, searched=None):
         self.mesh = mesh
 
     def propose(self, known):
@@ -82,6 +84,7 @@ class Blind:
 def blind(monkeypatch):
     """No test here looks for faces."""
     monkeypatch.setattr(proposing, "Proposer", Blind)
+    monkeypatch.setattr(proposing, "search_safely", lambda path, waits: None)
     monkeypatch.setattr(Blind, "found", {})
     proposing.adviser_of.cache_clear()
     yield Blind
@@ -178,7 +181,7 @@ def test_proposals_are_shown_by_sureness_and_taken(opened, blind):
 
 
 def test_a_partner_is_proposed_while_the_face_is_looked_for(opened):
-    adviser = proposing.Adviser(opened.mesh)
+    adviser = proposing.Adviser(opened.mesh, opened.panel.scene.opened.path)
     work = picking.placed(opened.work, "eye_outer_L", as_places(opened.marks)["eye_outer_L"])
     mirrored = adviser.first(work).places["eye_outer_R"]
     placement = opened.panel.scene.placement

@@ -5,16 +5,16 @@ from __future__ import annotations
 from studio_page import difference
 
 import facegen
+from facegen.studio.clip_panel import ClipPanel
 from facegen.studio.work import FaceWork
 
 
 def timeline(studio, browser_page):
-    """A page at the Timeline tab, and the program's side of it."""
-    made = studio()
+    """A page with the Timeline tab, and the program's side of it."""
+    made = studio(panels={"Timeline": ClipPanel})
     page = browser_page(made.server)
     page.until(lambda: made.pages)
     one, = made.pages.values()
-    page.tab("Timeline")
     return page, one
 
 
@@ -62,7 +62,6 @@ def test_a_recording_is_opened_plays_on_any_face_and_is_there_after_a_reload(stu
     opened = page.changed(neutral)
     assert difference(opened, neutral) > 0.005
     page.reload()
-    page.tab("Timeline")
     page.page.get_by_text("Recording", exact=True).click()
     page.says("take.csv")
     page.until(lambda: not page.button("Play").is_disabled())

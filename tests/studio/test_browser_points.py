@@ -9,6 +9,8 @@ import yaml
 from facegen.facs.deformation import load_deformation
 from facegen.studio.figure import SCALE
 from facegen.studio.page import FACE
+from facegen.studio.points_panel import PointsPanel
+from facegen.studio.tables_panel import TablesPanel
 
 
 def pixel(page, browser, at):
@@ -28,11 +30,10 @@ def place(page, point):
 
 
 def test_a_point_goes_where_the_mouse_takes_it_and_is_saved(studio, browser_page, tmp_path, shots):
-    one = studio()
+    one = studio(panels={"Points": PointsPanel})
     browser = browser_page(one.server)
     browser.until(lambda: len(one.pages) == 1)
     page, = one.pages.values()
-    browser.tab("Points")
     before = browser.pixels()
     browser.check("Show feature points")
     browser.until(lambda: (browser.pixels() != before).any(axis=2).sum() > 200)
@@ -51,11 +52,10 @@ def test_a_point_goes_where_the_mouse_takes_it_and_is_saved(studio, browser_page
 
 
 def test_a_table_is_saved_after_its_difference_was_seen(studio, browser_page, shots):
-    one = studio()
+    one = studio(panels={"Tables": TablesPanel})
     browser = browser_page(one.server)
     browser.until(lambda: len(one.pages) == 1)
     page, = one.pages.values()
-    browser.tab("Tables")
     browser.set("Name", "Ada")
     browser.press("New person")
     browser.until(lambda: page.work.table.file == "ada.yaml")

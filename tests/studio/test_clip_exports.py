@@ -14,9 +14,12 @@ from facegen.codec.link import read_stream
 from facegen.codec.recording import performance_of
 from facegen.errors import InputError
 from facegen.fileio.sound import read_wav
-from facegen.studio import recordings, script_text, timeline
+from facegen.studio import exports, recordings, script_text, timeline
 from facegen.studio.exports import FORMS, Wish, export, form_of
+from facegen.studio.limits import Limits
 from facegen.studio.work import ClipWork
+
+pytestmark = pytest.mark.usefixtures("read_here")
 
 SCRIPT = {"duration": 1.0, "keyframes": [{"t": 0.0, "pose": "0"}, {"t": 0.8, "pose": "6C+12D"}]}
 CLIP = timeline.read(SCRIPT)
@@ -50,6 +53,41 @@ def test_pictures_are_packed(tmp_path):
         assert pack.namelist() == [f"take/frame_0000{k}.png" for k in range(1, 6)]
         with pack.open("take/frame_00005.png") as file, Image.open(file) as picture:
             assert picture.size == (48, 48)
+
+
+@pytest.mark.parametrize(("label", "length", "limits", "said"), [
+    ("Numbered pictures (.zip)", 600, {}, r"15,000 pictures of 1920 x 1080 are about 8,343 MB, more than a browser"),
+    ("Film (.mp4)", 600, {}, r"about 8,343 MB, more than the studio puts on the disk \(4,096\)"),
+    ("Moving picture (.gif)", 600, {"export_bytes": 1 << 60}, r"more than the disk has room for \(8,192\)"),
+    *((label, 8000, {}, "200000 frames; the limit is 99999") for label in (
+        "Film (.webm)", "Animated head (.glb)", "Stream of few bits (.fgp)", RECORDED[0]))])
+def test_what_nothing_has_room_for_is_refused_before_it_is_made(tmp_path, monkeypatch, label, length, limits, said):
+    monkeypatch.setattr(exports, "LIMITS", Limits(**limits))
+    monkeypatch.setattr(exports.shutil, "disk_usage", lambda folder: type("Usage", (), {"free": 1 << 34})())
+    motion = timeline.read({**SCRIPT, "duration": length})
+    wish = Wish("akimoto", (1920, 1080), 25.0)
+    with pytest.raises(InputError, match=said):
+        export(motion, form_of(label), tmp_path, "take", wish, lambda stage, share: pytest.fail("it was begun"))
+    assert not list(tmp_path.iterdir())
+    exports.check_room(timeline.read(SCRIPT), form_of(label), tmp_path, wish)
+    exports.check_room(motion, form_of("Clip as text (.yaml)"), tmp_path, wish)
+
+
+def test_how_large_pictures_are_is_estimated_well(tmp_path):
+    """By what is drawn: a larger picture of a face has fewer bytes a pixel."""
+    made = export(CLIP, form_of("Numbered pictures (.zip)"), tmp_path, "take", Wish("akimoto-1986", (256, 256), 2.0),
+                  **QUIET)
+    assert 0.3 < made.path.stat().st_size / (exports._BYTES * 2 * 256 ** 2) < 1.2
+
+
+def test_what_takes_long_is_stopped(tmp_path):
+    """A stop is heard while frames are worked out, not only when they are."""
+    def stop(stage, share):
+        raise KeyboardInterrupt
+
+    for label in (RECORDED[0], "Stream of few bits (.fgp)", "Numbered pictures (.zip)"):
+        with pytest.raises(KeyboardInterrupt):
+            export(CLIP, form_of(label), tmp_path, "take", WISH, stop)
 
 
 def test_an_animated_head_moves_again(tmp_path):
@@ -137,8 +175,27 @@ def test_a_recording_is_kept_only_if_it_can_be_read(tmp_path):
         recordings.load(tmp_path, ClipWork(recording=name))
 
 
+def test_a_long_recording_is_cleaned_where_it_is_read(tmp_path, monkeypatch):
+    """It takes seconds, and nobody could stop it here; what comes of it is the same."""
+    from facegen.studio import reading
+
+    text = "time,jawOpen\n" + "".join(f"{k / 10},{0.2 + 0.5 * (k % 3)}\n" for k in range(30))
+    name, plain = recordings.keep(tmp_path, "take.csv", text.encode(), ClipWork())
+    work = ClipWork(recording=name, calibrate="0-1", smooth="on")
+    here = recordings.load(tmp_path, work)
+    monkeypatch.setattr(recordings, "_QUICK", 10)
+    monkeypatch.setattr(recordings, "cleaned", lambda *_, **__: pytest.fail("it was cleaned here"))
+    asked = []
+    ask = reading.ask
+    monkeypatch.setattr(reading, "ask", lambda *args: asked.append(args[0]) or ask(*args))
+    for _ in range(2):
+        np.testing.assert_array_equal(recordings.load(tmp_path, work).weights, here.weights)
+    assert np.abs(here.weights - plain.weights).max() > 0.1
+    assert asked == ["recording"]
+
+
 def test_too_large_a_recording_is_refused(tmp_path, monkeypatch):
-    monkeypatch.setattr(recordings, "LIMITS", recordings.Limits(file_bytes=100))
+    monkeypatch.setattr(recordings, "LIMITS", Limits(file_bytes=100))
     with pytest.raises(InputError, match="the studio takes up to"):
         recordings.keep(tmp_path, "take.csv", b"x" * 101, ClipWork())
     assert not Path(tmp_path / recordings.FOLDER).exists()

@@ -15,6 +15,8 @@ from facegen.studio.desk import Desk
 from facegen.studio.page import FACE, Page
 from facegen.studio.work import FaceWork
 
+pytestmark = pytest.mark.usefixtures("read_here")
+
 NAME = "work-of-one"
 CSV = "time,jawOpen,mouthSmileLeft\n0,0,0\n0.5,1,0.2\n1,0.5,0.4\n"
 
@@ -193,7 +195,7 @@ def test_sounds_are_said(opened):
 
 def test_a_recording_comes_plays_and_is_found_again(opened, tmp_path):
     opened.gui.find("Open a recording").enter(type("File", (), {"name": "my take.csv", "content": CSV.encode()})())
-    opened.wait(lambda: opened.page.work.clip.recording == "my_take.csv" and opened.panel.recording._task is None)
+    opened.wait(lambda: opened.page.work.clip.recording == "my_take.csv" and not opened.panel.recording._at_work)
     assert opened.page.work.clip.shown == "recording"
     path = tmp_path / "take.csv"
     path.write_text(CSV)

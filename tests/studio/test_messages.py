@@ -260,6 +260,56 @@ def test_hostile_files_are_told_of_and_the_studio_goes_on(studio, raw):
         time.sleep(0.05)
 
 
+def test_an_endless_recording_is_ended_and_stops_when_told(studio, raw, monkeypatch):
+    """A file that keeps its reader busy for minutes: another page is served meanwhile, Stop ends the reading at once,
+    its time ends it without, and the next recording opens."""
+    from facegen.studio import apart, recordings
+    from facegen.studio.clip_panel import ClipPanel
+
+    processes = []
+    popen = apart.subprocess.Popen
+    monkeypatch.setattr(apart.subprocess, "Popen", lambda *args, **options: processes.append(popen(*args, **options))
+                        or processes[-1])
+    monkeypatch.setattr(recordings, "LIMITS", Limits(read_seconds=600.0))
+    monkeypatch.setattr(apart, "_PROGRAM", apart._PROGRAM.replace(
+        "apart.answer(", "read = reading.JOBS['recording']\n"
+        "reading.JOBS['recording'] = lambda path, wish: read(path, wish) if path.stat().st_size < 999 else endless()\n"
+        "def endless():\n    while True: pass\n\napart.answer("))
+    running = studio(panels={"Timeline": ClipPanel})
+    page = raw(running.server).begin()
+    found = page.elements(1, seconds=2 * PATIENCE)
+    while "Open a recording" not in found:
+        found |= page.elements(1)
+    opens, content = found["Open a recording"], b"time,jawOpen\n" + b"0,1\n" * 400
+
+    def send(name, content):
+        page.send(_start(opens, len(content), name, filename=name), _part(opens, 0, content, name))
+
+    send("endless.csv", content)
+    stop = page.elements(1)
+    while "Stop" not in stop:
+        stop |= page.elements(1)
+    other = raw(running.server, "b" * 20).begin()
+    while "Open a recording" not in other.elements(1, seconds=2 * PATIENCE):
+        pass
+    assert processes[0].poll() is None, "it is still read while another page came"
+    page.send(_update(stop["Stop"], value=True))
+    assert page.until("NotificationShowMessage")["props"]["title"] == "endless.csv: stopped"
+    assert processes[0].poll() is not None
+    monkeypatch.setattr(recordings, "LIMITS", Limits(read_seconds=1.0))
+    send("endless.csv", content)
+    assert "endless.csv: cannot be read within 1 s" in page.until("NotificationShowMessage")["props"]["body"]
+    monkeypatch.setattr(recordings, "LIMITS", Limits())
+    send("good.csv", b"time,jawOpen\n0,0\n1,1\n")
+    end = time.monotonic() + PATIENCE
+    while not any(one.work.clip.recording == "good.csv" for one in running.pages.values()):
+        assert time.monotonic() < end
+        time.sleep(0.05)
+    assert [process.poll() is None for process in processes] == [False, False, False]
+    folder, = running.desk.store.folder.glob("a*/recording")
+    assert [path.name for path in folder.iterdir()] == ["good.csv"]
+
+
 def test_uploads_at_once_are_few(panel):
     server, page, uuids, _, events = panel(limits=Limits(uploads=2, upload_bytes=5 * PART))
     page.send(_start(uuids["open"], 2 * PART, "t1"), _start(uuids["open"], 4 * PART, "t2"),

@@ -12,16 +12,23 @@ import time
 import numpy as np
 import pytest
 
-from facegen.errors import FileError
+import facegen
+from facegen.animation.performance import Performance
+from facegen.errors import FileError, InputError
 from facegen.fileio.avatar import load_avatar
+from facegen.fileio.obj import format_obj
 from facegen.geometry.mesh import Mesh
-from facegen.studio import reading
+from facegen.studio import apart, reading
 from facegen.studio.counting import triangles
 from facegen.studio.limits import Limits
-from facegen.studio.reading import read_avatar_safely
+from facegen.studio.reading import read_avatar_safely, read_recording_safely
+from facegen.studio.task import Stopped
 from facegen.transfer.rig import avatar_files, avatar_names
 
 LIMITS = Limits(read_seconds=20.0, read_bytes=1 << 30)
+AVATAR = {"triangles": LIMITS.triangles}
+RECORDING = {"fps": None, "person": None, "seconds": LIMITS.recorded_seconds, "frames": LIMITS.frames,
+             "numbers": LIMITS.numbers, "clean": {}}
 
 
 def _glb(scene: dict, binary: bytes = b"", *, length: int | None = None) -> bytes:
@@ -64,7 +71,7 @@ def test_every_kind_is_read(tmp_path, shipped):
                                       "end_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n")
     found = read_avatar_safely(tmp_path / "cat.glb")
     np.testing.assert_allclose(found.shapes["up"], 1.0, atol=1e-6)
-    found = reading._Answers(io.BytesIO(reading._avatar(tmp_path / "one.ply", 9))).load()
+    found = reading._avatar(tmp_path / "one.ply", AVATAR)
     np.testing.assert_array_equal(found.mesh.vertices, vertices)
 
 
@@ -83,7 +90,7 @@ def test_broken_files_are_told_of(tmp_path, name, content):
     path = tmp_path / name
     path.write_bytes(content)
     with pytest.raises(FileError) as told:
-        reading._avatar(path, LIMITS.triangles)
+        reading._avatar(path, AVATAR)
     assert name in str(told.value)
     assert "root:" not in str(told.value)
     assert "\n" not in str(told.value)
@@ -102,7 +109,7 @@ def test_triangles_are_counted_before_anything_is_made(tmp_path, monkeypatch):
     for name in ("a.ply", "a.stl", "a.glb", "b.glb", "a.obj"):
         assert triangles(tmp_path / name) == 9000
         with pytest.raises(FileError, match="9,000 triangles, the studio takes up to 8,000"):
-            reading._avatar(tmp_path / name, 8000)
+            reading._avatar(tmp_path / name, {"triangles": 8000})
 
 
 @pytest.mark.parametrize("name", avatar_names())
@@ -118,8 +125,8 @@ def test_what_is_counted_is_what_is_read(name, tmp_path):
 
 def test_what_takes_too_long_is_ended(tmp_path, monkeypatch):
     """A reader that never ends stands for any file that makes one so."""
-    monkeypatch.setattr(reading, "_START", 2.0)
-    monkeypatch.setattr(reading, "_PROGRAM", "while True: pass")
+    monkeypatch.setattr(apart, "_START", 2.0)
+    monkeypatch.setattr(apart, "_PROGRAM", "while True: pass")
     (tmp_path / "a.obj").write_text("v 0 0 0")
     begin = time.monotonic()
     with pytest.raises(FileError, match="within 1 s"):
@@ -134,13 +141,111 @@ def test_what_takes_too_long_is_ended(tmp_path, monkeypatch):
 def test_what_a_reader_does_stays_in_its_process(tmp_path, monkeypatch, does, told):
     (tmp_path / "a.obj").write_text("v 0 0 0")
     body = "\n".join(f"    {line}" for line in does.split("\n"))
-    monkeypatch.setattr(reading, "_PROGRAM", reading._PROGRAM.replace(
-        "reading.answer()", f"def bad(path, most):\n{body}\n    return b''\nreading._avatar = bad\nreading.answer()"))
+    monkeypatch.setattr(apart, "_PROGRAM", apart._PROGRAM.replace(
+        "apart.answer(", f"def bad(path, wish):\n{body}\nreading.JOBS['avatar'] = bad\napart.answer("))
     with pytest.raises(FileError, match=told):
         read_avatar_safely(tmp_path / "a.obj", Limits(read_seconds=1.0, read_bytes=256 << 20))
 
 
-def test_an_answer_is_nothing_but_an_avatar():
+def test_who_waits_can_have_it_ended_at_once(tmp_path, monkeypatch):
+    """What the button Stop does: nothing is left running."""
+    monkeypatch.setattr(apart, "_PROGRAM", "import sys; sys.stdin.read()\nwhile True: pass")
+    processes, told = [], []
+    popen = apart.subprocess.Popen
+    monkeypatch.setattr(apart.subprocess, "Popen", lambda *args, **options: processes.append(popen(*args, **options))
+                        or processes[0])
+
+    def waits(seconds):
+        told.append(seconds)
+        if len(told) == 3:
+            raise Stopped
+
+    for read in (read_avatar_safely, read_recording_safely):
+        processes.clear(), told.clear()
+        with pytest.raises(Stopped):
+            read(tmp_path / "a.obj", LIMITS, waits=waits)
+        assert told == sorted(told)
+        assert processes[0].poll() is not None
+
+
+def test_a_face_is_looked_for_in_the_other_process(tmp_path, monkeypatch):
+    """It takes ten seconds to a minute; in the studio's own process others waited up to 0.4 s where it was busy."""
+    from facegen.landmarking import propose
+    from facegen.studio.proposing import Adviser
+    from facegen.studio.work import AvatarWork
+
+    path = tmp_path / "half.obj"
+    path.write_text(format_obj(facegen.load_face().mesh(0)))
+    mesh = load_avatar(path).mesh
+    monkeypatch.setattr(propose, "candidates", lambda *_: pytest.fail("it was looked for here"))
+    adviser, told = Adviser(mesh, path), []
+    advice = adviser.advice(AvatarWork(file="half.obj"), told.append)
+    assert advice.sure > 0.9
+    assert {"nose_tip", "chin", "mouth_corner_L"} <= set(advice.places)
+    assert advice.advised == "eye_outer_L"
+    assert adviser.ready
+    assert told
+    told.clear()
+    assert adviser.advice(AvatarWork(file="half.obj"), told.append).sure == advice.sure
+    assert not told
+
+
+def test_who_goes_while_a_face_is_looked_for_leaves_nothing(tmp_path, monkeypatch, shipped):
+    from facegen.studio.proposing import Adviser
+    from facegen.studio.work import AvatarWork
+
+    def waits(seconds):
+        raise Stopped
+
+    adviser = Adviser(load_avatar(shipped).mesh, shipped)
+    with pytest.raises(Stopped):
+        adviser.advice(AvatarWork(file="cat"), waits)
+    assert not adviser.ready
+    monkeypatch.setattr(apart, "_PROGRAM", "raise SystemExit(3)")
+    advice = adviser.advice(AvatarWork(file="cat"))
+    assert "No face could be looked for" in advice.warnings[0]
+    assert str(shipped.parent) not in advice.warnings[0]
+    assert not advice.places
+
+
+def test_a_recording_is_read_as_ever(tmp_path):
+    path = tmp_path / "take.csv"
+    path.write_text("time,jawOpen,who\n0,0,anna\n0.5,1,anna\n1,,bert\n")
+    found, known = read_recording_safely(path, LIMITS), facegen.load_performance(path)
+    np.testing.assert_array_equal(found.weights, known.weights)
+    np.testing.assert_array_equal(found.times, known.times)
+    assert (found.names, found.vocabulary, found.warnings, found.about) == (
+        known.names, known.vocabulary, known.warnings, known.about)
+    assert list(found.extra) == list(known.extra)
+    assert list(found.extra["who"]) == ["anna", "anna", "bert"]
+    with pytest.raises(InputError, match="has 3 frames, the timeline takes up to 2"):
+        read_recording_safely(path, Limits(frames=2))
+
+
+@pytest.mark.parametrize(("limit", "said"), [
+    ({"seconds": 0.5}, "lasts 0.0 hours"), ({"frames": 2}, "has 3 frames"), ({"numbers": 14}, "holds 15 numbers")])
+def test_a_recording_of_too_much_is_told_of(tmp_path, limit, said):
+    path = tmp_path / "take.csv"
+    path.write_text("time,jawOpen,browInnerUp\n0,0,0\n0.5,1,0\n1,0,0\n")
+    assert isinstance(reading._recording(path, RECORDING), Performance)
+    with pytest.raises(InputError, match=said):
+        reading._recording(path, {**RECORDING, **limit})
+
+
+@pytest.mark.parametrize(("name", "content"), [
+    ("a.csv", b""), ("a.csv", b"\0" * 1000), ("a.csv", b"time,jawOpen\nx,y\n"),
+    ("a.csv", b"a," * 100_000), ("a.json", b"[" * 100_000), ("a.json", b'{"a": ' * 100_000), ("a.json", b"[1e999]"),
+    ("a.glb", b"glTF" + bytes(40)), ("a.glb", _glb(_scene(2**31))), ("a.fgp", b""), ("a.fgp", bytes(1000)),
+    ("a.fgp", b"\xff" * 1000)])
+def test_broken_recordings_are_told_of(tmp_path, name, content):
+    path = tmp_path / name
+    path.write_bytes(content)
+    with pytest.raises(InputError) as told:
+        reading._recording(path, RECORDING)
+    assert len(str(told.value)) < 1000
+
+
+def test_an_answer_is_nothing_but_avatars_and_recordings():
     """The process that read a stranger's file is not trusted either."""
     class Evil:
         def __reduce__(self):
@@ -150,10 +255,10 @@ def test_an_answer_is_nothing_but_an_avatar():
 
     for found in (pickle.dumps(Evil()), pickle.dumps(os.system), pickle.dumps(load_avatar),
                   b"cfacegen.fileio.binfile\nread_bytes\n."):
-        with pytest.raises(pickle.UnpicklingError, match="no part of an avatar"):
-            reading._Answers(io.BytesIO(found)).load()
+        with pytest.raises(pickle.UnpicklingError, match="no part of an answer"):
+            apart.Answers(io.BytesIO(found)).load()
     mesh = Mesh.of(np.eye(3), np.array([[0, 1, 2]]))
-    assert isinstance(reading._Answers(io.BytesIO(pickle.dumps(mesh, 5))).load(), Mesh)
+    assert isinstance(apart.Answers(io.BytesIO(pickle.dumps(mesh, 5))).load(), Mesh)
 
 
 def test_a_program_in_the_folder_is_not_run(tmp_path, monkeypatch, shipped):

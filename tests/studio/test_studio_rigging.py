@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.spatial import cKDTree
 
 from facegen.errors import InputError
 from facegen.face.avatar import AvatarFace
@@ -81,6 +82,22 @@ def test_tuning_computes_only_what_it_changes_and_shows_what_would_be_written(ma
     assert wider[:, 1].min() <= same[:, 1].min() + 1e-6
     low = np.linalg.norm(wider - posed(opened.avatar.mesh.vertices, told, {}), axis=1).max()
     assert low > 1.2 * np.linalg.norm(same - posed(opened.avatar.mesh.vertices, told, {}), axis=1).max()
+
+
+def test_a_head_turns_while_it_is_tuned_after_a_reload_too(made):
+    """The file that was made has the vertices of an OBJ avatar in another order, and seams twice."""
+    _, maker, work, opened, found, _ = made
+    meaning, file = load_face().resolve("51E+54D"), load_avatar(found.path)
+    rows = np.r_[:len(file.mesh.vertices), 0][::-1]
+    other = replace(file.mesh, vertices=file.mesh.vertices[rows], faces=len(rows) - 1 - file.mesh.faces)
+    seams = replace(file, mesh=other, shapes={name: one[rows] for name, one in file.shapes.items()})
+    for face in (AvatarFace(found.avatar), load_face(found.path), AvatarFace(seams)):
+        mesh, _ = maker.shown(work, opened, face, meaning)
+        assert mesh.parts == opened.avatar.mesh.parts
+        wanted = face.pose(meaning)
+        assert np.abs(wanted - face.pose("neutral")).max() > 30.0
+        assert cKDTree(mesh.vertices).query(wanted)[0].max() < 1e-3
+    assert len(wanted) != len(mesh.vertices)
 
 
 def test_who_stops_it_finds_everything_as_it_was(made):

@@ -4,6 +4,7 @@ import json
 import stat
 from dataclasses import replace
 
+import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
@@ -13,7 +14,7 @@ from facegen.errors import FileError, InputError, TableError
 from facegen.facs.tables import load_units
 from facegen.studio.history import STEPS, TOGETHER, History
 from facegen.studio.store import Store
-from facegen.studio.work import FaceWork, Work
+from facegen.studio.work import FaceWork, TableWork, Work
 
 weights = st.floats(0.0, 1.0, allow_subnormal=False)
 
@@ -170,3 +171,46 @@ def test_a_gaze_takes_the_place_of_units_that_turn_the_eyes(script):
     both, alone = (FaceWork(units=one, gaze=gaze).checked().meaning(rig=face) for one in (units, others))
     assert face.pose(both) == pytest.approx(face.pose(alone), abs=1e-9)
     assert not any(load_units().basis[name].eyes for name in load_units().coefficients(both.units))
+
+
+TARGET = np.array([30.0, -10.0, 250.0])
+
+
+@pytest.mark.parametrize("script", ["0", "57E", "51C+55D", "58D+53C+61E"])
+@pytest.mark.parametrize("raw", [
+    {}, {"head": {"yaw": -12.0, "pitch": 8.0, "roll": 6.0}}, {"head": {"forward": 9.0, "yaw": 10.0}},
+    {"head": {"forward": 0.3}, "units": "face"}, {"head": {"forward": 0.2, "roll": -7.0}, "units": "paper"}])
+def test_eyes_meet_what_they_look_at_however_the_head_is_held(script, raw):
+    """By the posed eyeballs themselves: their centre and how they turned."""
+    face = facegen.load_face("akimoto-1986" if raw.get("units") == "paper" else "akimoto")
+    work = FaceWork(units=facegen.parse(script), raw={"units": "millimetre", **raw} if raw else {},
+                    gaze=dict(zip("xyz", TARGET.tolist(), strict=True))).checked()
+    meaning = work.meaning(rig=face)
+    assert face.head_angles(meaning).any() == (script != "0" or bool(raw))
+    rest, posed = face.mesh().vertices, face.pose(meaning)
+    for part, centre in zip(("eye_L", "eye_R"), face.eye_centres, strict=True):
+        ball = face.mesh().part_vertices(part)
+        u, _, vt = np.linalg.svd((posed[ball] - posed[ball].mean(axis=0)).T @ (rest[ball] - rest[ball].mean(axis=0)))
+        turn = u @ np.diag([1.0, 1.0, np.linalg.det(u @ vt)]) @ vt
+        at = posed[ball].mean(axis=0) + turn @ (centre - rest[ball].mean(axis=0))
+        way, away = turn @ [0.0, 0.0, 1.0], TARGET - at
+        assert np.degrees(np.arccos(np.clip(way @ away / np.linalg.norm(away), -1, 1))) < 0.2
+
+
+@pytest.mark.parametrize("rotation", [None, [[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]]])
+def test_an_avatars_eyes_look_as_the_faces_do(rig_of, rotation):
+    """Made of the base face, in metres and in whatever axes."""
+    from facegen.face.avatar import AvatarFace
+
+    avatar, face = AvatarFace(rig_of("units", rotation=rotation)), facegen.load_face()
+    work = FaceWork(units=facegen.parse("57D+12C"), raw={"head": {"yaw": 14.0, "forward": 6.0}, "units": "millimetre"},
+                    gaze=dict(zip("xyz", TARGET.tolist(), strict=True)))
+    found, wanted = (work.meaning(rig=rig).more[-1].eyes for rig in (avatar, face))
+    assert found == pytest.approx(wanted, abs=0.7)
+    assert wanted != pytest.approx(facegen.look_at(face, TARGET), abs=3.0)
+
+
+def test_a_table_of_too_many_habits_is_refused():
+    data = {"about": "a", "source": "b", "aliases": dict.fromkeys([f"w{k}" for k in range(2000)], "happiness")}
+    with pytest.raises(InputError, match="has 2,000 habits"):
+        TableWork("ada.yaml", data).checked()

@@ -203,3 +203,16 @@ def test_no_data_at_all_are_more_than_refused(data):
 def test_a_text_that_is_no_script_says_why(text, says):
     with pytest.raises(TableError, match=says):
         script_text.read(text)
+
+
+def test_more_keys_than_a_page_can_bear_are_refused_before_they_are_read(monkeypatch):
+    """Seven thousand take five seconds, again with every change."""
+    from facegen.studio.limits import Limits
+
+    many = {"keyframes": [{"t": k, "pose": "12"} for k in range(3)],
+            "tracks": [{"events": [{"at": k, "kind": "blink"} for k in range(2)]}]}
+    monkeypatch.setattr(timeline, "LIMITS", Limits(items=5))
+    timeline.check_form(many)
+    monkeypatch.setattr(timeline, "LIMITS", Limits(items=4))
+    with pytest.raises(TableError, match="has 5 keys and events, the timeline takes up to 4"):
+        timeline.check_form(many)
