@@ -17,6 +17,9 @@ from facegen.transfer.alignment import Similarity
 Array = NDArray[np.float64]
 
 _DECIMALS = 3       # micrometres
+# Brows that lie nearer together than the base face's come together by less: what they moved by beyond that would fold
+# the skin between them into a slit.
+_BROWS, _ABOVE_THE_NOSE = "brow_room", ("brow_", "forehead_")
 
 
 def face_data(base: Base, shape: Shape, space: Space, eyes: Eyes, bite: Similarity, *, name: str, source: str,
@@ -29,8 +32,11 @@ def face_data(base: Base, shape: Shape, space: Space, eyes: Eyes, bite: Similari
     data = dict(old)
     measures, ratios = _measures(base, shape, eyes)
     data |= {"name": name, "source": source, "cage": "cage.obj", "surface": "surface.obj",
-             "centre_O": _row(space(old["centre_O"])), "measures": measures, "parts": parts}
-    data["points"] = {key: _point(one, space, bite) for key, one in old["points"].items()}
+             "centre_O": _row(space(old["centre_O"])), "parts": parts,
+             "measures": {**measures, _BROWS: _brow_room(base, shape, ratios)},
+             "scales": {**old["scales"], _BROWS: [_BROWS, *old["scales"]["upper"][1:]]}}
+    data["points"] = {key: _point(one, space, bite) | ({"scale": _BROWS} if key.startswith(_ABOVE_THE_NOSE) else {})
+                      for key, one in old["points"].items()}
     hinge = space(old["jaw"]["hinge"])
     data["jaw"] = {**old["jaw"], "hinge": _row(hinge),
                    "glide": _row(np.array(old["jaw"]["glide"]) * ratios["mouth_width"])}
@@ -87,6 +93,13 @@ def _measures(base: Base, shape: Shape, eyes: Eyes) -> tuple[dict[str, float], d
     before, after = lengths(base.cage.vertices, homes), lengths(shape.cage, eyes.centres)
     ratios = {key: after[key] / before[key] for key in before}
     return {key: round(value * ratios[key], _DECIMALS) for key, value in base.data["measures"].items()}, ratios
+
+
+def _brow_room(base: Base, shape: Shape, ratios: Mapping[str, float]) -> float:
+    """Return what the eyes' separation, to which brows refer their movement aside, is for brows, mm."""
+    gap, room = (float(np.linalg.norm(cage[base.point("brow_inner_L")] - cage[base.point("brow_inner_R")]))
+                 for cage in (base.cage.vertices, shape.cage))
+    return round(base.data["measures"]["eye_separation"] * min(room / gap, ratios["eye_separation"]), _DECIMALS)
 
 
 def _point(entry: dict[str, Any], space: Space, bite: Similarity) -> dict[str, Any]:

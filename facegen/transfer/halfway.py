@@ -18,8 +18,9 @@ from facegen.transfer.piece_motion import PieceMotion
 
 Array = NDArray[np.float64]
 
-# An eye that comes through lids half way by more than this share of its radius is seen to.
-_SEEN = 0.03
+# Lids that miss being as clear of the eye half way as `keep_lids` asks, which is up to 0.02 more than not to be cut by
+# it, by more than this share of its radius are seen to.
+_SEEN = 0.05
 # Skin this many radii from the eye's centre still goes all of the way round it; from the second on it goes straight.
 _NEAR, _FAR = 1.35, 1.8
 

@@ -12,7 +12,8 @@ from facegen.transfer.pushing import DONE, ROUNDS, Contact, Spread, moving
 
 Array = NDArray[np.float64]
 
-# Because facets of a ball and of lids that lie on it cross by as much, this share of the eye's radius is no fault.
+# Because facets of a ball and of lids that lie on it cross by as much, this share of the eye's radius is no fault; and
+# skin that is clear of the eye at rest has to stay as clear, lest it show between samples.
 _FACETS = 0.01
 # Lids lie within so many radii of the eye's centre, and before the plane that is this far behind it.
 _LID_REACH, _LID_BACK = 1.7, -0.2
@@ -59,7 +60,8 @@ class Lids:
                                         np.full((len(faces), 3), 1 / 3)])
         self._samples = np.einsum("sc,sci->si", self._weights, self._rest[self._corners])
         rest = self._clearance(self._samples, np.eye(3))
-        self._least = np.minimum(rest, 0.0) - _FACETS * ball.radius
+        facets = _FACETS * ball.radius
+        self._least = np.minimum(rest, 0.0) + np.clip(rest - 2.0 * facets, -facets, facets)
         self._spare = np.where(np.isfinite(rest), rest, 0.0) - self._least
 
     def _clearance(self, places: Array, turn: Array) -> Array:

@@ -172,6 +172,22 @@ def test_amounts_are_in_the_person_s_own_proportions(man, base):
     assert face._data.scales["mouth"][0] == pytest.approx(width, rel=0.05)
 
 
+def test_brows_that_lie_near_together_fold_no_slit_between_them(man):
+    """In anger the skin there still faces forward, all but the walls of its two furrows."""
+    _, face = man
+    mesh, posed = face.mesh(3), face.pose("anger", detail=3)
+    marks = face.landmark_points(mesh.vertices, detail=3)
+    faces = mesh.faces[mesh.face_parts == mesh.parts.index("skin")]
+    middle = (marks["brow_inner_L"] + marks["brow_inner_R"]) / 2
+    faces = faces[(np.abs(mesh.vertices[faces].mean(axis=1) - middle) < (10.0, 16.0, 12.0)).all(axis=1)]
+    assert len(faces) > 500
+    a, b, c = np.moveaxis(posed[faces], 1, 0)
+    normals = np.cross(b - a, c - a)
+    forward = normals[:, 2] / np.linalg.norm(normals, axis=1)
+    assert forward.min() > -0.1
+    assert (forward < 0.2).mean() < 0.02
+
+
 def test_own_brows_hair_and_colours_come_along(man):
     _, face = man
     head = load_avatar_of("human")

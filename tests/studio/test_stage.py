@@ -35,6 +35,16 @@ def test_every_triangle_has_one_colour():
     assert len({colour for colour, _ in groups}) == len(groups)
 
 
+def test_of_a_mouth_only_the_inside_is_drawn_where_it_is_known(client):
+    turned = facegen.Mesh(mesh.vertices, mesh.faces[:, ::-1], mesh.materials, mesh.face_materials, mesh.parts,
+                          mesh.face_parts)
+    for one, sides in ((mesh, {"front", "double"}), (turned, {"double"})):
+        assert {handle.side for handle, _ in Figure(client.scene, "face", one)._handles} == sides
+    lining = mesh.face_materials == mesh.materials.index("mouth")
+    [rows] = [rows for handle, rows in Figure(client.scene, "face", mesh)._handles if handle.side == "front"]
+    assert np.array_equal(rows, np.unique(mesh.faces[lining]))
+
+
 def test_colours_of_vertices_are_gathered_into_a_few_near_ones():
     rng = np.random.default_rng(0)
     base = np.array([[220, 170, 150], [90, 50, 40], [240, 240, 235]], float)

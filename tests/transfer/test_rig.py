@@ -9,6 +9,7 @@ from facegen.cli import main
 from facegen.errors import FileError, InputError
 from facegen.face.face import load_face
 from facegen.fileio.avatar import load_avatar
+from facegen.geometry.ahead import ahead
 from facegen.geometry.mesh import Mesh
 from facegen.transfer.halfway import half_name
 from facegen.transfer.landmarks import Landmarks
@@ -55,6 +56,30 @@ def test_a_rigged_avatar_is_a_face(rigged, face):
         corner = smile[f"mouth_corner_{side}"] - rest[f"mouth_corner_{side}"]
         assert corner[1] > 1.0                                  # up and out, mm on a human-sized head
         assert outward * corner[0] > 1.0
+
+
+def test_no_eye_comes_through_the_skin_over_it(rigged, face):
+    """Places of the left eye that are covered at rest, as seen from where it looks to, are covered when brow and cheek
+    move."""
+    mesh = face.mesh()
+    eye, skin = (mesh.faces[np.isin(mesh.face_parts, [k for k, part in enumerate(mesh.parts) if part.startswith(name)])]
+                 for name in ("eye_L", "skin"))
+    at = rigged.found.frame.apply
+    look = at(face.landmark_points(mesh.vertices)["eye_center_L"][None])[0] - at(mesh.vertices[np.unique(eye)]).mean(0)
+    ahead_of = look / np.linalg.norm(look)
+    aside = np.cross([0.0, 1.0, 0.0], ahead_of) / np.linalg.norm(ahead_of[[0, 2]])
+    turn = np.stack([aside, np.cross(ahead_of, aside), ahead_of])
+    shares = np.array([(i, j, 6 - i - j) for i in range(7) for j in range(7 - i)]) / 6
+
+    def covered(vertices):
+        vertices = at(vertices) @ turn.T
+        return ahead(np.einsum("sc,fci->fsi", shares, vertices[eye]).reshape(-1, 3), vertices[skin])[0]
+
+    rest = covered(mesh.vertices)
+    for name in ("AU1_L", "AU2_L", "AU4_L", "AU6_L", "AU7_L", "AU9_L"):
+        now = covered(face.pose_shapes({name: 1.0}))
+        through = (rest > 0) & (now < -0.05) & (now > -3.0)             # not where the lid bares it
+        assert not through.any(), (name, through.sum())
 
 
 def test_the_jaw_opens_the_mouth_and_teeth_go_with_their_bone(rigged, face):

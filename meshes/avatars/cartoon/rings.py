@@ -10,6 +10,8 @@ from head import EAR, EYE, EYE_RADIUS, MIRROR, MOUTH, MOUTH_HALF, Array, face_sh
 
 AROUND_EYE, AROUND_MOUTH, AROUND_NOSE, AROUND_EAR = 20, 20, 16, 12        # vertices of a ring
 AROUND_LIDS = 2 * AROUND_EYE               # of the rings at the lids' edge: it closes on itself over the whole eyeball
+# How pointed the corners of the opening are, and until so many degrees outside it: round ones crumple as lids close.
+POINTED, POINTED_UNTIL = 0.6, 15.0
 
 
 def turns(count: int) -> tuple[Array, Array]:
@@ -41,7 +43,8 @@ def lid_ring(outside: float, radius: float, count: int = AROUND_EYE) -> Array:
     c, s = turns(count)
     side = np.where(c > 0, 50.0, 43.0) + outside * np.where(c > 0, 1.0, 0.8)
     high = np.where(s > 0, 36.0, 38.0) + outside * np.where(s > 0, 1.0, 0.75)
-    across, up = side * c, high * s
+    pointed = POINTED * max(1.0 - outside / POINTED_UNTIL, 0.0)
+    across, up = side * c, high * s * np.abs(s) ** pointed
     up += np.where(s > 0, 3.0 * s * s * -c, 0.0) + 2.0 * np.abs(c) ** 3 * np.sign(c)     # the arch leans inwards
     turn = np.radians(np.hypot(across, up))[:, None]
     flat = np.stack([across, up], axis=1) / np.maximum(np.hypot(across, up), 1e-9)[:, None]

@@ -25,6 +25,7 @@ from muzzle import EDGE, LIP, add_mouth, add_nostril, inner_parts, lips, nostril
 from numpy.typing import NDArray  # noqa: E402
 from plan import Plan, neck_loop  # noqa: E402
 from saving import both_sides, save_avatar  # noqa: E402
+from scipy.interpolate import PchipInterpolator  # noqa: E402
 from sheet import Sheet  # noqa: E402
 
 from facegen.geometry.mesh import Mesh, merge  # noqa: E402
@@ -33,8 +34,6 @@ MILLIMETRES = 50.0  # in a unit of the model
 COLOURS = {
     "coat": (158, 90, 48),
     "coat_dark": (104, 62, 42),
-    "coat_pale": (172, 109, 67),
-    "muzzle_edge": (189, 136, 98),
     "blaze": (244, 236, 224),
     "muzzle": (206, 166, 134),
     "muzzle_dark": (128, 92, 80),
@@ -63,10 +62,11 @@ LID_RINGS = {"offsets": (0.38, 0.22, 0.1), "edge": 0.045, "crest": 1.05, "inside
 # The white of the face, seen square to it: half of its outline, (x, z).
 BLAZE = ((0.0, 2.2), (0.3, 2.6), (0.55, 3.2), (0.5, 3.9), (0.4, 5.0), (0.36, 7.0), (0.42, 8.6), (0.44, 9.5), (0.38, 9.9),
          (0.2, 10.25), (0.0, 10.35))
-# Where the muzzle pales, in steps: (z at these heights, what begins there).
+# Where the muzzle pales, in steps too small to be seen each: z at these heights where they begin and end, and how many.
 HEIGHTS = (-3.0, -1.6, -0.6, 0.4, 1.4)
-MUZZLE = (((6.6, 6.7, 7.2, 8.1, 8.6), "coat_pale"), ((7.1, 7.2, 7.7, 8.6, 9.1), "muzzle_edge"),
-          ((7.6, 7.7, 8.2, 9.1, 9.6), "muzzle"))
+MUZZLE, STEPS = ((6.5, 6.6, 7.1, 8.0, 8.5), (7.6, 7.7, 8.2, 9.1, 9.6)), 5
+COLOURS |= {f"muzzle_{k}": tuple(round(a + (b - a) * k / STEPS) for a, b in zip(COLOURS["coat"], COLOURS["muzzle"],
+                                                                             strict=True)) for k in range(1, STEPS)}
 
 
 def spacing(points: NDArray) -> NDArray:
@@ -76,7 +76,8 @@ def spacing(points: NDArray) -> NDArray:
     away = np.linalg.norm(points[:, None] - features, axis=2) - reach
     coarse = np.clip(0.19 + 0.17 * np.maximum(away.min(axis=1), 0), 0.19, 0.72)
     x, y, z = points.T
-    return np.where((x < 0.9) & (y > 0) & (z > 2) & (z < 9.9), np.minimum(coarse, 0.38), coarse)
+    coarse = np.where((x < 0.9) & (y > 0) & (z > 2) & (z < 9.9), np.minimum(coarse, 0.38), coarse)
+    return np.where((z > paling(y, 1) - 0.3) & (z < paling(y, STEPS) + 0.3), np.minimum(coarse, 0.25), coarse)
 
 
 def on_top(clay: Clay, flat: NDArray) -> NDArray:
@@ -89,8 +90,8 @@ def colours(middles: NDArray) -> list[str]:
     """Return the material at places (n, 3) of the left half."""
     _, y, z = middles.T
     names = np.full(len(middles), "coat", dtype=object)
-    for edge, name in MUZZLE:
-        names[z > np.interp(y, HEIGHTS, edge)] = name
+    for k in range(1, STEPS + 1):
+        names[z > paling(y, k)] = f"muzzle_{k}" if k < STEPS else "muzzle"
     names[in_blaze(middles)] = "blaze"
     return list(names)
 
@@ -102,14 +103,20 @@ def in_blaze(points: NDArray) -> NDArray[np.bool_]:
     return (x < np.interp(z, outline[:, 1], outline[:, 0], left=0.0, right=0.0)) & (y > -0.3)
 
 
-def muzzle_edge(clay: Clay, edge: tuple[float, ...]) -> NDArray:
-    """Return a dense line (n, 3) round the left half of the muzzle, from above to below. edge: z at the heights."""
+def paling(heights: NDArray, k: int) -> NDArray:
+    """Return z at heights (n,) where the muzzle's k-th step begins."""
+    first, last = (PchipInterpolator(HEIGHTS, edge)(np.clip(heights, HEIGHTS[0], HEIGHTS[-1])) for edge in MUZZLE)
+    return first + (last - first) * (k - 1) / (STEPS - 1)
+
+
+def muzzle_edge(clay: Clay, k: int) -> NDArray:
+    """Return a dense line (n, 3) round the left half of the muzzle, from above to below, where its k-th step begins."""
     turn = np.linspace(0.02, np.pi - 0.02, 150)
     ways = np.stack([np.sin(turn), np.cos(turn), 0 * turn], axis=1)
     at = np.tile([0.0, -0.4, 8.8], (len(turn), 1))
     for _ in range(3):
         places = clay.shoot(at, ways, 5.0)
-        at[:, 2] = np.interp(places[:, 1], HEIGHTS, edge)
+        at[:, 2] = paling(places[:, 1], k)
     return clay.shoot(at, ways, 5.0)
 
 
@@ -123,8 +130,8 @@ def head(clay: Clay) -> Sheet:
     plan.add_points(on_top(clay, np.array([BLAZE[-1]])))
     plan.add_middle(-90, 270)
     plan.add_edge(on_top(clay, curve(np.array(BLAZE), 300)))
-    for edge, _ in MUZZLE:
-        line = muzzle_edge(clay, edge)
+    for k in range(1, STEPS + 1):
+        line = muzzle_edge(clay, k)
         plan.add_edge(line[~in_blaze(line)])
     vertices, faces = plan.covered(CANDIDATES)
     sheet = Sheet("skin")
