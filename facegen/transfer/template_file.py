@@ -28,6 +28,7 @@ from facegen.transfer.halfway import half_name
 from facegen.transfer.landmarks import Landmarks, check_places, load_landmarks, snap
 from facegen.transfer.measured_motion import measured_gaze, measured_jaw
 from facegen.transfer.piece_motion import PieceMotion
+from facegen.transfer.same_pieces import TemplatePiece
 from facegen.transfer.sides import settled, side_fields
 from facegen.transfer.template import Template
 from facegen.transfer.tongue import Tongue
@@ -145,13 +146,15 @@ def _template(file: TemplateFile) -> Template:
     pieces = PieceMotion(parts.pieces, parts.vertices, parts.faces, parts.points)
     hinge, jaw, share = measured_jaw(pieces, motion)
     motion, jaw = motion[:len(names)], jaw[:len(names)]
-    tongue = None
-    if len(rows := pieces.rows("tongue")):
-        at = pieces.vertices[rows]
-        with_jaw = 0.0 if hinge is None else hinge.movement(at, jaw)
-        tongue = Tongue(pieces.surface("tongue"), motion[:, rows] - with_jaw, pieces.face)
+    own: dict[str, TemplatePiece] = {}
+    for kind in dict.fromkeys(piece.kind for piece in pieces.pieces if piece.kind != "skin"):
+        rows = pieces.rows(kind)
+        of_jaw = np.ones(len(rows)) if kind == "tongue" else share[rows]
+        with_jaw = 0.0 if hinge is None else of_jaw[:, None] * hinge.movement(pieces.vertices[rows], jaw)
+        own[kind] = TemplatePiece(pieces.surface(kind), motion[:, rows] - with_jaw, of_jaw)
+    tongue = Tongue(own["tongue"].surface, own["tongue"].motion, pieces.face) if "tongue" in own else None
     places = parts.places([name for name in landmarks.names if not name.startswith("eye_center")])
     places = settled(parts.surface, places, side_fields(parts.surface, places))
     points = {name: weights @ parts.surface.vertices[rows] for name, (rows, weights) in places.items()}
     return Template(file.avatar.path.stem, parts.surface, points, places, names, motion[:, parts.rows], jaw,
-                    measured_gaze(pieces, motion), hinge, share[parts.rows], minus, tongue)
+                    measured_gaze(pieces, motion), hinge, share[parts.rows], minus, tongue, own)
