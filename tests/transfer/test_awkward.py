@@ -133,6 +133,17 @@ def test_what_closes_a_crack_goes_with_its_edge(plain, few):
     assert not smile[n + 3].any()
 
 
+def test_a_speck_in_a_seam_goes_with_its_edge(plain, few):
+    """A triangle of no size, which flat ones alone hold: it used to rest where it was."""
+    mesh, marks, _ = plain
+    (a, b, _), _ = cheek(mesh)
+    n, middle = len(mesh.vertices), 0.5 * (mesh.vertices[a] + mesh.vertices[b])
+    copy = awkward.plus(awkward.same(mesh), middle + 1e-6 * np.eye(3), [[n, n + 1, n + 2], [a, n, b], [n, n + 1, b]])
+    smile = transfer(copy.mesh, copy.landmarks(marks), few).shapes["mouthSmileLeft"]
+    assert np.abs(smile[a]).max() > 0.01
+    np.testing.assert_allclose(smile[n:], np.tile(0.5 * (smile[a] + smile[b]), (3, 1)), atol=1e-4)
+
+
 def test_a_torso_rests(plain, few):
     mesh, marks, _ = plain
     copy = awkward.with_torso(mesh, -0.7)
