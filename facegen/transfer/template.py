@@ -18,6 +18,7 @@ from facegen.face.deformer import Jaw
 from facegen.face.face import Face
 from facegen.face.motion import joined
 from facegen.geometry.closest import ClosestPoints
+from facegen.geometry.mesh import Mesh
 from facegen.geometry.operators import Surface
 from facegen.transfer.face_measures import FaceMeasures
 from facegen.transfer.piece_names import KINDS, kind_of_name
