@@ -25,8 +25,8 @@ _CONTRADICTION = -0.01
 # Because a foot on a side is as near on one triangle as on the other, and rounding is not to decide: squares of
 # distances count as one below this share, of the square or of a typical triangle's; cosines below that difference.
 _SAME, _ALIKE = 1e-9, 1e-6
-# Of triangles that are as near and face alike the one farthest along this way is taken: none that faces are built along,
-# so that few are as far, and the order of a file's triangles decides nothing.
+# Of triangles that are as near and face alike the one farthest along this way is taken: one along which no face is
+# built, so that few are as far, and the order of a file's triangles decides nothing.
 _WAY = np.array([0.7391, 0.5823, 0.3382])
 _TINY = 1e-300
 

@@ -14,7 +14,7 @@ from facegen.data import meshes_dir
 from facegen.errors import FileError, InputError, nearest
 from facegen.face.face import load_face
 from facegen.fileio.avatar import AvatarFile, check_output, load_avatar, save_avatar
-from facegen.fileio.kept import kept_in
+from facegen.fileio.kept import Kept, kept_in
 from facegen.progress import Progress, silent, within
 from facegen.transfer.choices import Choices
 from facegen.transfer.halfway import half_name
@@ -157,9 +157,9 @@ class Rigging:
                                  f"{nearest(str(name), self.names)}")
         if self._binding is None:
             progress("making the shapes of the template", 0.0)
-            self._binding = Binding(self.source.mesh, self.places, self._asked.template(), pieces=self._pieces,
-                                    kept=kept_in("registrations") if self._cache else None,
-                                    progress=within(progress, 0.1, 0.4))
+            kept = kept_in("registrations") if self._cache else None
+            self._binding = Binding(self.source.mesh, self.places, self._asked.template(kept), pieces=self._pieces,
+                                    kept=kept, progress=within(progress, 0.1, 0.4))
             progress = within(progress, 0.4, 1.0)
         return self._binding.shapes(choices, self.names if only is None else only, progress=progress)
 
@@ -196,10 +196,11 @@ def rig(avatar: str | Path, output: str | Path, *, landmarks: str | Path | None 
 
 @dataclass(frozen=True)
 class _Asked:
-    """What is to be made. ``sets``: shape -> the vocabulary it belongs to, empty if unknown; ``template``: makes it."""
+    """What is to be made. ``sets``: shape -> the vocabulary it belongs to, empty if unknown; ``template``: makes it, and
+    keeps registrations where it is told to."""
 
     sets: Mapping[str, str]
-    template: Callable[[], Template]
+    template: Callable[[Kept | None], Template]
 
 
 def _asked(sets: Sequence[str] | None, shapes: Sequence[str] | None, person: str | Path | None,
@@ -225,7 +226,7 @@ def _asked(sets: Sequence[str] | None, shapes: Sequence[str] | None, person: str
     # A corrective is made from the shape that it corrects, whether or not that is asked for.
     needed = {*wanted, *(recipes[name].minus for name in wanted)}
     of = tuple((name, recipe) for name, recipe in recipes.items() if name in needed)
-    return _Asked({name: recipes[name].set for name in wanted}, lambda: _template(of))
+    return _Asked({name: recipes[name].set for name in wanted}, lambda kept: _template(of))
 
 
 @lru_cache(maxsize=1)         # many avatars with the same shapes; a template is tens of megabytes

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,6 +26,9 @@ from facegen.transfer.piece_names import KINDS, kind_of_name
 from facegen.transfer.same_pieces import TemplatePiece
 from facegen.transfer.tongue import Tongue
 
+if TYPE_CHECKING:
+    from facegen.transfer.margins import Margins
+
 DETAIL = 2
 """Subdivision level of the template: about 11,000 triangles, 4 mm long."""
 
@@ -39,7 +43,8 @@ class Template:
     (k, n, 3) mm. ``jaw`` (k, 3): opening in degrees, side and forward in mm; ``gaze`` (k, 4): yaw and pitch in degrees,
     left eye then right. ``hinge``: how the jaw moves; ``jaw_share`` (n,): how much of it each vertex takes. ``minus``
     (k,): the shape to take away from the result, or -1. ``tongue``: how that moves beside going with the jaw, or None.
-    ``pieces``: kind -> all of that kind beside the skin, for avatars that have the same.
+    ``pieces``: kind -> all of that kind beside the skin, for avatars that have the same. ``margins``: slit -> its
+    edges, as far as they are known already.
     """
 
     name: str
@@ -55,6 +60,7 @@ class Template:
     minus: tuple[int, ...]
     tongue: Tongue | None = None
     pieces: Mapping[str, TemplatePiece] = field(default_factory=dict)
+    margins: Mapping[str, Margins] = field(default_factory=dict)
 
     @property
     def height(self) -> float:
