@@ -7,7 +7,7 @@ template's margin, on which the avatar's skin was registered: the shortest way a
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +15,8 @@ from scipy import sparse
 from scipy.sparse.csgraph import dijkstra
 from scipy.spatial import cKDTree
 
+from facegen.geometry.closest import ClosestPoints
+from facegen.geometry.fade import smooth_step
 from facegen.geometry.operators import Surface
 from facegen.geometry.spline import smooth_curve
 from facegen.transfer.sides import SLITS, painted
@@ -30,6 +32,10 @@ SAMPLES = 33
 _NARROW = 0.7
 # A way on the wrong side of the slit is so many times as long.
 _WRONG_SIDE = 20.0
+# Lips that touch tell their own edges: the skin of one that lies as near to the other's, mm, where its side is beyond
+# doubt by so much. A way along it is so many times as short, and twice as long at most for being beside the guide; the
+# row that touches most closely, mm, is the outer one.
+_TOUCH, _OF_A_LIP, _APART, _CLOSELY = 0.8, 0.02, 10.0, 0.25
 # An edge this many times as long as the line through its landmarks goes round something else: there is no slit.
 _LONGEST = 2.5
 # Millimetres on the template: no way leads farther round the guide than this.
@@ -37,6 +43,9 @@ _BESIDE = 20.0
 # An avatar's own lengths decide by so much which places of its edges face each other, the template's by the rest: where
 # many vertices lie at one corner of the template's, their own order spreads them.
 _OWN = 0.3
+# But where edges were found farther than the first of these beside the template's, mm, their own decide more, and
+# alone from the second on.
+_ASIDE, _ASTRAY = 1.0, 4.0
 # A guide is sampled at so many places.
 _GUIDE = 200
 
@@ -63,7 +72,7 @@ class Margins:
     """``upper``, ``lower``: (SAMPLES, n) weights of the vertices that place facing places of the two edges, corner to
     corner; ``rows``: the vertices on one of them, ``at`` their position along the slit, 0 to 1, and ``is_upper``;
     ``corners``: vertices of both. ``line`` (2, g, 3): the edges as curves, mm; ``paths``: each edge's vertices
-    (p, 3), mm, and their positions (p,) along the slit."""
+    (p, 3), mm, and their positions (p,) along the slit; ``ways``: which vertices (p,) those are."""
 
     upper: sparse.csr_array
     lower: sparse.csr_array
@@ -73,6 +82,12 @@ class Margins:
     corners: NDArray[np.int64]
     line: Array
     paths: tuple[tuple[Array, Array], ...]
+    ways: tuple[NDArray[np.int64], ...]
+
+    def on(self, vertices: Array) -> Margins:
+        """Return them with curves as they run on the skin's vertices (n, 3) in another shape."""
+        return replace(self, line=np.array([_resampled(vertices[way], _GUIDE) for way in self.ways]),
+                       paths=tuple((vertices[way], t) for way, (_, t) in zip(self.ways, self.paths, strict=True)))
 
     def ends(self, places: Array) -> tuple[Array, Array]:
         """Return the facing places (SAMPLES, 3) of the upper and the lower edge, for the skin's vertices (n, 3)."""
@@ -89,7 +104,8 @@ def facing_margins(skin: Skin, slit: Slit) -> tuple[Margins, Margins] | None:
     template = skin.template
     if slit.side in painted(skin.surface, skin.places, skin.sides):
         return None
-    own = find_margins(template.surface, slit, template.places, skin.correspondence.sides)
+    own = template.margins.get(slit.name) or find_margins(template.surface, slit, template.places,
+                                                          skin.correspondence.sides)
     if own is None:
         return None
     avatar = find_margins(skin.surface, slit, skin.places, skin.sides, shape=skin.registered, guide=own)
@@ -106,13 +122,14 @@ def find_margins(surface: Surface, slit: Slit, places: Places, sides: Array, *, 
     """
     at = surface.vertices if shape is None else shape
     sign = sides[:, slit.side]
+    apart = None if guide is None or slit is not LIPS else _apart(surface, sign)
     paths, lines = [], []
     for edge, (names, up) in enumerate(((slit.upper, 1.0), (slit.lower, -1.0))):
         stops = _stops(slit, names, places)
         if stops is None:
             return None
         line = _curve(at[stops]) if guide is None else guide.line[edge]
-        path = _way(surface, at, stops, line, up * sign)
+        path = _way(surface, at, stops, line, up * sign, apart)
         if path is None or _lengths(surface.vertices[path])[-1] > _LONGEST * _lengths(surface.vertices[stops])[-1]:
             return None
         paths.append(path)
@@ -123,7 +140,9 @@ def find_margins(surface: Surface, slit: Slit, places: Places, sides: Array, *, 
     n = len(surface.vertices)
     along = [_along(surface.vertices[path]) for path in paths]
     if guide is not None:
-        along = [_OWN * t + (1 - _OWN) * _beside(at[path], *edge)
+        off = max(float(cKDTree(line).query(at[path])[0].mean()) for line, path in zip(guide.line, paths, strict=True))
+        own = _OWN + (1 - _OWN) * float(smooth_step((off - _ASIDE) / (_ASTRAY - _ASIDE)))
+        along = [own * t + (1 - own) * _beside(at[path], *edge)
                  for t, path, edge in zip(along, paths, guide.paths, strict=True)]
     upper, lower = (_sampler(path, t, n) for path, t in zip(paths, along, strict=True))
     own = [~np.isin(path, both) for path in paths]
@@ -131,7 +150,7 @@ def find_margins(surface: Surface, slit: Slit, places: Places, sides: Array, *, 
     where = np.concatenate([t[keep] for t, keep in zip(along, own, strict=True)])
     is_upper = np.arange(len(rows)) < own[0].sum()
     return Margins(upper, lower, rows, where, is_upper, both, np.array(lines),
-                   tuple((at[path], t) for path, t in zip(paths, along, strict=True)))
+                   tuple((at[path], t) for path, t in zip(paths, along, strict=True)), tuple(paths))
 
 
 def _stops(slit: Slit, names: tuple[str, ...], places: Places) -> NDArray | None:
@@ -149,15 +168,35 @@ def _curve(stops: Array) -> Array:
     return smooth_curve(t, stops, np.linspace(0, t[-1], _GUIDE))
 
 
-def _way(surface: Surface, at: Array, stops: NDArray, line: Array, side: Array) -> NDArray | None:
-    """Return the vertices of the cheapest way along edges from stop to stop, or None where there is none."""
+def _apart(surface: Surface, side: Array) -> Array:
+    """Return how far (n,) the skin of either lip is from the other one, mm; infinite for what is of none. side (n,): 1
+    above to -1 below."""
+    result = np.full(len(side), np.inf)
+    for own in (side, -side):
+        rows, others = np.flatnonzero(own > _OF_A_LIP), (own[surface.faces] < -_OF_A_LIP).all(axis=1)
+        if len(rows) and others.any():
+            result[rows] = ClosestPoints(Surface(surface.vertices, surface.faces[others]))(
+                surface.vertices[rows]).distances
+    return result
+
+
+def _way(surface: Surface, at: Array, stops: NDArray, line: Array, side: Array, apart: Array | None
+         ) -> NDArray | None:
+    """Return the vertices of the cheapest way along edges from stop to stop, or None where there is none. apart:
+    `_apart`."""
     edges, _ = surface.edges
     middle = (at[edges[:, 0]] + at[edges[:, 1]]) / 2
     near = ((middle > line.min(axis=0) - _BESIDE) & (middle < line.max(axis=0) + _BESIDE)).all(axis=1)
     edges, middle = edges[near], middle[near]
     off, _ = cKDTree(line).query(middle)
-    length = np.linalg.norm(at[edges[:, 0]] - at[edges[:, 1]], axis=1) + 1e-6
-    length = length * (1 + (off / _NARROW) ** 2) * np.where(side[edges].min(axis=1) < 0, _WRONG_SIDE, 1.0)
+    where = at if apart is None else surface.vertices
+    length = np.linalg.norm(where[edges[:, 0]] - where[edges[:, 1]], axis=1) + 1e-6
+    beside = (off / _NARROW) ** 2
+    if apart is not None:
+        far = apart[edges].max(axis=1)
+        close = np.minimum(beside, 1.0) + (np.minimum(far, _TOUCH) / _CLOSELY) ** 2
+        beside = np.where(far < _TOUCH, (1 + close) / _APART - 1, beside)
+    length = length * (1 + beside) * np.where(side[edges].min(axis=1) < 0, _WRONG_SIDE, 1.0)
     n = len(at)
     graph = sparse.csr_array((length, (edges[:, 0], edges[:, 1])), shape=(n, n))
     _, before = dijkstra(graph, directed=False, indices=stops[:-1], return_predecessors=True)

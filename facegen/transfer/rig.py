@@ -14,7 +14,7 @@ from facegen.data import meshes_dir
 from facegen.errors import FileError, InputError, nearest
 from facegen.face.face import load_face
 from facegen.fileio.avatar import AvatarFile, check_output, load_avatar, save_avatar
-from facegen.fileio.kept import kept_in
+from facegen.fileio.kept import Kept, kept_in
 from facegen.forked import Aside
 from facegen.progress import Progress, silent, within
 from facegen.transfer.choices import Choices
@@ -114,12 +114,13 @@ class Rigging:
         avatar, landmarks: as in `rig`, or what `load_avatar` and `snap` gave. Everything else as in `rig`.
         """
         self._asked = asked = _asked(sets, shapes, person, template, template_landmarks)
-        with Aside(asked.make, useful=not _last.made_of(asked.of)) as template:
+        self._kept = kept = kept_in("registrations") if cache else None
+        with Aside(lambda: asked.make(kept), useful=not _last.made_of(asked.of)) as template:
             self.source, self.places, odd = _read(avatar, landmarks)
             if template.forked:
                 _last.template(asked.of, template.result)
         self.warnings = (*odd, *_without_expressions(self.source, asked.sets))
-        self._pieces, self._cache = pieces, cache
+        self._pieces = pieces
         self._binding: Binding | None = None
         self._once = False
 
@@ -161,9 +162,8 @@ class Rigging:
                                  f"{nearest(str(name), self.names)}")
         if self._binding is None:
             progress("making the shapes of the template", 0.0)
-            template = _last.template(self._asked.of, self._asked.make)
-            self._binding = Binding(self.source.mesh, self.places, template, pieces=self._pieces,
-                                    kept=kept_in("registrations") if self._cache else None,
+            template = _last.template(self._asked.of, lambda: self._asked.make(self._kept))
+            self._binding = Binding(self.source.mesh, self.places, template, pieces=self._pieces, kept=self._kept,
                                     progress=within(progress, 0.1, 0.4))
             progress = within(progress, 0.4, 1.0)
         return self._binding.shapes(choices, self.names if only is None else only, progress=progress)
@@ -202,11 +202,11 @@ def rig(avatar: str | Path, output: str | Path, *, landmarks: str | Path | None 
 @dataclass(frozen=True)
 class _Asked:
     """What is to be made. ``sets``: shape -> the vocabulary it belongs to, empty if unknown; ``make``: makes the
-    template, ``of`` this."""
+    template, ``of`` this, and keeps registrations where it is told to."""
 
     sets: Mapping[str, str]
     of: Hashable
-    make: Callable[[], Template]
+    make: Callable[[Kept | None], Template]
 
 
 def _asked(sets: Sequence[str] | None, shapes: Sequence[str] | None, person: str | Path | None,
@@ -232,7 +232,7 @@ def _asked(sets: Sequence[str] | None, shapes: Sequence[str] | None, person: str
     # A corrective is made from the shape that it corrects, whether or not that is asked for.
     needed = {*wanted, *(recipes[name].minus for name in wanted)}
     of = tuple((name, recipe) for name, recipe in recipes.items() if name in needed)
-    return _Asked({name: recipes[name].set for name in wanted}, of, lambda: template_of(load_face(), dict(of)))
+    return _Asked({name: recipes[name].set for name in wanted}, of, lambda kept: template_of(load_face(), dict(of)))
 
 
 class _Last:

@@ -22,6 +22,9 @@ from facegen.geometry.winding import winding
 # Because float32 puts a vertex on an edge no better than this: a triangle as flat, as a share of its longest side,
 # closes a crack and has no area.
 _FLAT = 1e-4
+# Millimetres: a triangle without a longer side is a place. Those that reducing programs leave in a seam are held by
+# flat triangles alone, and would rest while all round them moves.
+_PLACE = 1e-3
 # The landmarks' triangles look ahead on every face that looks out, a horse's too; less than this tells nothing.
 _LOOKS = 0.1
 # Where flat triangles leave a corner undecided it keeps near the others: this firmly, so that it never outvotes them.
@@ -87,11 +90,11 @@ def skin_mesh(vertices: NDArray, faces: NDArray, numbers: NDArray, places: Mappi
 
 
 def _flat(vertices: NDArray, faces: NDArray) -> NDArray[np.bool_]:
-    """Return which triangles have no area: two corners are one vertex, or all lie on a line."""
+    """Return which triangles have no area: two corners are one vertex, or all lie on a line or at one place."""
     a, b, c = np.moveaxis(vertices[faces], 1, 0)
     twice = np.linalg.norm(np.cross(b - a, c - a), axis=1)
     longest = np.max([((p - q) ** 2).sum(axis=1) for p, q in ((a, b), (b, c), (c, a))], axis=0)
-    return (twice <= _FLAT * longest) | (faces == np.roll(faces, 1, axis=1)).any(axis=1)
+    return (twice <= _FLAT * longest) | (longest <= _PLACE**2) | (faces == np.roll(faces, 1, axis=1)).any(axis=1)
 
 
 def _inward(surface: Surface, numbers: NDArray, places: Mapping[str, NDArray]) -> tuple[NDArray, list[str]]:

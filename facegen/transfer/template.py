@@ -7,7 +7,8 @@ template from a file (template_file) that is measured.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,9 +19,15 @@ from facegen.face.deformer import Jaw
 from facegen.face.face import Face
 from facegen.face.motion import joined
 from facegen.geometry.closest import ClosestPoints
+from facegen.geometry.mesh import Mesh
 from facegen.geometry.operators import Surface
 from facegen.transfer.face_measures import FaceMeasures
+from facegen.transfer.piece_names import KINDS, kind_of_name
+from facegen.transfer.same_pieces import TemplatePiece
 from facegen.transfer.tongue import Tongue
+
+if TYPE_CHECKING:
+    from facegen.transfer.margins import Margins
 
 DETAIL = 2
 """Subdivision level of the template: about 11,000 triangles, 4 mm long."""
@@ -36,6 +43,8 @@ class Template:
     (k, n, 3) mm. ``jaw`` (k, 3): opening in degrees, side and forward in mm; ``gaze`` (k, 4): yaw and pitch in degrees,
     left eye then right. ``hinge``: how the jaw moves; ``jaw_share`` (n,): how much of it each vertex takes. ``minus``
     (k,): the shape to take away from the result, or -1. ``tongue``: how that moves beside going with the jaw, or None.
+    ``pieces``: kind -> all of that kind beside the skin, for avatars that have the same. ``margins``: slit -> its
+    edges, as far as they are known already.
     """
 
     name: str
@@ -50,6 +59,8 @@ class Template:
     jaw_share: NDArray[np.float64]
     minus: tuple[int, ...]
     tongue: Tongue | None = None
+    pieces: Mapping[str, TemplatePiece] = field(default_factory=dict)
+    margins: Mapping[str, Margins] = field(default_factory=dict)
 
     @property
     def height(self) -> float:
@@ -88,21 +99,30 @@ def template_of(face: Face, shapes: Mapping[str, Recipe], *, detail: int = DETAI
     motion = posed[:, :n] - surface.vertices
     hinge = face.deformer.jaw
     opened = np.array([_TEST_OPENING, 0.0, 0.0])
-    test = face.pose({"units": "millimetre", "jaw": {"open": _TEST_OPENING}}, detail=detail)[:n] - surface.vertices
-    turned = hinge.movement(surface.vertices, opened)
+    test = face.pose({"units": "millimetre", "jaw": {"open": _TEST_OPENING}}, detail=detail) - mesh.vertices
+    turned = hinge.movement(mesh.vertices, opened)
     share = np.clip((test * turned).sum(axis=1) / np.maximum((turned**2).sum(axis=1), 1e-12), 0.0, 1.0)
     landmarks = {name: weights @ surface.vertices[rows] for name, (rows, weights) in places.items()}
     order = {name: row for row, name in enumerate(shapes)}
     minus = tuple(-1 if shape.minus is None else order[shape.minus] for shape in shapes.values())
-    tongue = None
-    if "tongue" in mesh.parts:
-        rows = mesh.part_vertices("tongue")
-        own = Surface(mesh.vertices[rows],
-                      np.searchsorted(rows, mesh.faces[mesh.face_parts == mesh.parts.index("tongue")]))
-        beside = posed[:, rows] - own.vertices - hinge.movement(own.vertices, together.jaw)
-        tongue = Tongue(own, beside, FaceMeasures(landmarks))
+    pieces = {}
+    for kind, parts in _parts_by_kind(mesh).items():
+        rows, own = np.unique(mesh.faces[np.isin(mesh.face_parts, parts)], return_inverse=True)
+        at = mesh.vertices[rows]
+        beside = posed[:, rows] - at - share[rows, None] * hinge.movement(at, together.jaw)
+        pieces[kind] = TemplatePiece(Surface(at, own.reshape(-1, 3)), beside, share[rows])
+    tongue = Tongue(pieces["tongue"].surface, pieces["tongue"].motion, FaceMeasures(landmarks)) \
+        if "tongue" in pieces else None
     return Template(face.name, surface, landmarks, places, tuple(shapes), motion, together.jaw, together.eyes,
-                    hinge, share, minus, tongue)
+                    hinge, share[:n], minus, tongue, pieces)
+
+
+def _parts_by_kind(mesh: Mesh) -> dict[str, list[int]]:
+    """Return kind -> the parts of a face that are of it, but for the skin, which is the first."""
+    result: dict[str, list[int]] = {}
+    for number, name in enumerate(mesh.parts[1:], start=1):
+        result.setdefault(name if name in KINDS else kind_of_name(name), []).append(number)
+    return result
 
 
 def skin_places(face: Face, surface: Surface, detail: int) -> dict[str, tuple[NDArray, NDArray]]:

@@ -8,9 +8,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from facegen.blendshapes.recipes import shape_set
 from facegen.errors import FileError, InputError, nearest
@@ -18,6 +20,7 @@ from facegen.face.avatar_notes import Notes, read_notes
 from facegen.face.face import load_face
 from facegen.face.landmarks import REQUIRED
 from facegen.fileio.avatar import AvatarFile, load_avatar
+from facegen.fileio.kept import Kept
 from facegen.fileio.shape_folder import load_shape_folder
 from facegen.geometry.closest import ClosestPoints
 from facegen.geometry.mesh import Mesh
@@ -26,10 +29,13 @@ from facegen.transfer.alignment import align
 from facegen.transfer.apart import take_apart
 from facegen.transfer.halfway import half_name
 from facegen.transfer.landmarks import Landmarks, check_places, load_landmarks, snap
+from facegen.transfer.margins import LIDS, LIPS, Margins, facing_margins
 from facegen.transfer.measured_motion import measured_gaze, measured_jaw
 from facegen.transfer.piece_motion import PieceMotion
+from facegen.transfer.same_pieces import TemplatePiece
 from facegen.transfer.sides import settled, side_fields
-from facegen.transfer.template import Template
+from facegen.transfer.skin import lay_skin
+from facegen.transfer.template import Template, template_of
 from facegen.transfer.tongue import Tongue
 
 LANDMARKS = "landmarks.yaml"
@@ -49,9 +55,10 @@ class TemplateFile:
     shapes: tuple[str, ...]
     sets: Mapping[str, str]
 
-    def template(self) -> Template:
-        """Return it as a template. Raises InputError for a mesh that cannot be used."""
-        return _template(self)
+    def template(self, kept: Kept | None = None) -> Template:
+        """Return it as a template. kept: where registrations are kept. Raises InputError for a mesh that cannot be
+        used."""
+        return _template(self, kept)
 
 
 def read_template(path: str | Path, *, landmarks: str | Path | None = None,
@@ -124,7 +131,7 @@ def _noted(notes: Notes, mesh: Mesh) -> Landmarks:
     return Landmarks(found.names, faces, mesh.faces[faces].astype(np.int64), weights)
 
 
-def _template(file: TemplateFile) -> Template:
+def _template(file: TemplateFile, kept: Kept | None) -> Template:
     mesh, landmarks = file.avatar.mesh, file.landmarks
     base = load_face()
     home = base.landmark_points(base.mesh(0).vertices, detail=0)
@@ -145,13 +152,29 @@ def _template(file: TemplateFile) -> Template:
     pieces = PieceMotion(parts.pieces, parts.vertices, parts.faces, parts.points)
     hinge, jaw, share = measured_jaw(pieces, motion)
     motion, jaw = motion[:len(names)], jaw[:len(names)]
-    tongue = None
-    if len(rows := pieces.rows("tongue")):
-        at = pieces.vertices[rows]
-        with_jaw = 0.0 if hinge is None else hinge.movement(at, jaw)
-        tongue = Tongue(pieces.surface("tongue"), motion[:, rows] - with_jaw, pieces.face)
+    own: dict[str, TemplatePiece] = {}
+    for kind in dict.fromkeys(piece.kind for piece in pieces.pieces if piece.kind != "skin"):
+        rows = pieces.rows(kind)
+        of_jaw = np.ones(len(rows)) if kind == "tongue" else share[rows]
+        with_jaw = 0.0 if hinge is None else of_jaw[:, None] * hinge.movement(pieces.vertices[rows], jaw)
+        own[kind] = TemplatePiece(pieces.surface(kind), motion[:, rows] - with_jaw, of_jaw)
+    tongue = Tongue(own["tongue"].surface, own["tongue"].motion, pieces.face) if "tongue" in own else None
     places = parts.places([name for name in landmarks.names if not name.startswith("eye_center")])
     places = settled(parts.surface, places, side_fields(parts.surface, places))
     points = {name: weights @ parts.surface.vertices[rows] for name, (rows, weights) in places.items()}
     return Template(file.avatar.path.stem, parts.surface, points, places, names, motion[:, parts.rows], jaw,
-                    measured_gaze(pieces, motion), hinge, share[parts.rows], minus, tongue)
+                    measured_gaze(pieces, motion), hinge, share[parts.rows], minus, tongue, own,
+                    _margins(parts.surface, places, kept))
+
+
+@cache
+def _base() -> Template:
+    return template_of(load_face(), {name: recipe for name, recipe in shape_set("arkit").items() if name == "jawOpen"})
+
+
+def _margins(surface: Surface, places: Mapping[str, tuple[NDArray, NDArray]], kept: Kept | None) -> dict[str, Margins]:
+    """Return the edges of the skin's slits: as facegen's own face has them, which knows the way between landmarks. A
+    cat's upper lip goes down and up between the corner and the middle of its mouth."""
+    skin = lay_skin(_base(), surface, places, kept=kept)
+    found = {slit.name: facing_margins(skin, slit) for slit in (*LIDS, LIPS)}
+    return {name: both[1].on(surface.vertices) for name, both in found.items() if both is not None}

@@ -16,6 +16,7 @@ from facegen.transfer.keep_apart import Guard
 from facegen.transfer.margins import LIDS, LIPS, Slit
 from facegen.transfer.piece_motion import PieceMotion, RigidMotions
 from facegen.transfer.pushing import Contact
+from facegen.transfer.same_pieces import SamePieces
 from facegen.transfer.sides import painted
 from facegen.transfer.skin import Skin
 
@@ -38,6 +39,7 @@ class WholeMotion:
         self._skin, self._rows, self._n = skin, parts.rows, len(parts.vertices)
         self._hanging = parts.skin
         self._pieces = pieces = PieceMotion(parts.solid, parts.vertices, parts.skin.wound(parts.faces), parts.points)
+        self._same = SamePieces(skin.template.pieces, pieces.pieces, parts.vertices)
         self._guard = Guard(pieces)
         fronts = {f"eye_{s}": EyeFront(ball, parts.vertices[pieces.rows(f"eye_{s}")])
                   for s, ball in pieces.eyes.items()}
@@ -68,16 +70,21 @@ class WholeMotion:
         turns = None if own is None else RigidMotions.of(lambda at: own.movement(at, jaw))
         tongue = None if template.tongue is None else replace(template.tongue, motion=template.tongue.motion[shapes])
         motion = pieces.move(among_all(on_skin, self._rows, self._n), turns, gaze, tongue=tongue)
+        with_jaw = None if own is None else own.movement(pieces.vertices[self._same.rows], jaw)
+        self._same.lead(motion, shapes, with_jaw)
         # A tongue that comes out is before the lips, and is meant to be.
         out = {} if tongue is None else {"tongue": np.where(tongue.comes_out() > 0, np.inf, 0.0)}
         contacts = self._guard(motion, gaze, allowed=out)
         if skin.copied:             # whatever pokes through it there
             motion[:, self._rows] = on_skin
+            self._same.lead(motion, shapes, with_jaw)
         for slit in slits:
             slit.seal(motion, self._rows)
         lids = [slit for slit in slits if slit.eye is not None]
         halves = {} if skin.copied or not lids else halfway(pieces, self._guard, lids, self._rows, motion,
                                                                   self._closing[shapes])
+        for half in halves.values():
+            half[self._same.rows] *= 1.0 - self._same.trust[:, None]
         self._hanging.carry(motion)
         self._hanging.carry(halves.values())
         return motion, Beside(contacts, {int(shapes[k]): one for k, one in halves.items()})

@@ -47,6 +47,17 @@ def moved(turn, offset=(0.0, 0.0, 0.0)) -> Callable[[Mesh], Copy]:
     return lambda mesh: replace(same(mesh.with_vertices(mesh.vertices @ turn + offset)), turn=turn)
 
 
+def shuffled(mesh: Mesh) -> Copy:
+    """Vertices, triangles and the corners of these in another order, and so the pieces too."""
+    some = np.random.default_rng(0)
+    order, faces = some.permutation(len(mesh.vertices)), some.permutation(len(mesh.faces))
+    rows = np.argsort(order)
+    corners = (np.arange(3) + some.integers(0, 3, len(faces))[:, None]) % 3
+    return Copy(replace(mesh, vertices=mesh.vertices[order],
+                        faces=np.take_along_axis(rows[mesh.faces[faces]], corners, axis=1),
+                        face_parts=mesh.face_parts[faces], face_materials=mesh.face_materials[faces]), rows, np.eye(3))
+
+
 def wound(mesh: Mesh, rows) -> Copy:
     """Some triangles the other way round."""
     faces = mesh.faces.copy()

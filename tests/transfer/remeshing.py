@@ -44,7 +44,7 @@ def remesh(template: Template, share: float) -> tuple[Surface, NDArray]:
 
 
 def remesh_all(template: Template, share: float) -> tuple[Mesh, NDArray, NDArray]:
-    """Return the face with its eyes, teeth and tongue in other triangles, its true motion (k, n, 3), and which vertices
+    """Return the face with all its parts in other triangles, its true motion (k, n, 3), and which vertices
     (n,) are the skin's. ImportError without fast_simplification."""
     from fast_simplification import simplify
 
@@ -54,7 +54,7 @@ def remesh_all(template: Template, share: float) -> tuple[Mesh, NDArray, NDArray
     motion = face.pose_controls(joined(face, several), detail=DETAIL) - whole.vertices
     skin, true = remesh(template, share)
     meshes, trues = [Mesh.of(skin.vertices, skin.faces)], [true]
-    for part in ("eye_L", "eye_R", "teeth_upper", "teeth_lower", "tongue"):
+    for part in whole.parts[1:]:
         rows, own = np.unique(whole.faces[whole.face_parts == whole.parts.index(part)], return_inverse=True)
         surface = Surface(whole.vertices[rows], own.reshape(-1, 3).astype(np.int32))
         points, faces = _halved(surface.vertices, surface.faces)

@@ -3,12 +3,16 @@
 import numpy as np
 import pytest
 from remeshing import errors, remesh_all
+from scipy.spatial.transform import Rotation
 
+from facegen.face.face import load_face
+from facegen.face.motion import joined
+from facegen.facs.tables import load_units
 from facegen.geometry.operators import Surface
 from facegen.transfer.baselines import PAPER
 from facegen.transfer.landmarks import snap
 from facegen.transfer.skin import lay_skin
-from facegen.transfer.template import places_on
+from facegen.transfer.template import DETAIL, places_on
 from facegen.transfer.transfer import transfer
 
 
@@ -18,13 +22,27 @@ def test_a_template_transferred_to_itself_gives_itself(template):
     assert np.abs(skin.motion() - template.motion).max() < 1e-6 * template.height
 
 
+def test_a_whole_copy_moves_as_the_template_does(template):
+    """Every part of it, through the door: turned, scaled and moved."""
+    size, offset = 0.013, [3.0, -7.0, 11.0]
+    mesh = load_face().mesh(DETAIL)
+    several = [(one,) for name, one in load_units().basis.items() if not one.head]
+    true = load_face().pose_controls(joined(load_face(), several), detail=DETAIL) - mesh.vertices
+    matrix = size * Rotation.from_rotvec([0.8, 1.0, -1.5]).as_matrix()
+    copy = mesh.with_vertices(mesh.vertices @ matrix + offset)
+    marks = snap({name: at @ matrix + offset for name, at in template.landmarks.items()}, copy)
+    made = transfer(copy, marks, template).shapes
+    for name, wanted in zip(template.names, true, strict=True):
+        assert np.abs(made[name] - wanted @ matrix).max() < 1e-6 * size * template.height, name
+
+
 # These move the lids by tenths of a millimetre only, where the cornea lifts them; of the skin alone no share is asked.
 GAZES = ("61", "62", "65", "66")
 
 
 @pytest.mark.parametrize(("share", "most"), [(0.3, 0.06), (0.4, 0.06), (1.0, 0.03), (2.0, 0.03)])
 def test_other_triangles_move_as_the_template_does(template, share, most):
-    """Eyes, teeth, tongue and all, by the door that an avatar goes through, its lids closed over its own eyes."""
+    """Eyes, teeth, lining, hair and all, by the door that an avatar goes through, its lids closed over its own eyes."""
     pytest.importorskip("fast_simplification")
     mesh, true, skin = remesh_all(template, share)
     made = transfer(mesh, snap(template.landmarks, mesh), template).shapes
@@ -34,7 +52,7 @@ def test_other_triangles_move_as_the_template_does(template, share, most):
     assert whole < most
     of_all = errors(found, true)[1]
     assert dict(zip(template.names, of_all.round(3), strict=True)) == pytest.approx(dict.fromkeys(template.names, 0),
-                                                                                     abs=0.17 if share < 0.4 else 0.15)
+                                                                                     abs=0.15)
     away = np.linalg.norm(found - true, axis=2) / np.linalg.norm(true, axis=2).max(axis=1)[:, None]
     assert np.percentile(away, 99) < 0.07
     slight = np.isin(template.names, GAZES)

@@ -61,12 +61,8 @@ def test_a_template_transferred_to_itself_gives_itself(name, tmp_path, request):
     template = load_avatar(path)
     height = np.ptp(template.mesh.vertices[:, 1])
     assert [name for name in back.shapes if not name.endswith("_half")] == SHAPES
-    skin, inside = (of_kind(template, template.notes, *kinds)
-                    for kinds in (("skin",), ("eye_L", "eye_R", "teeth_upper", "teeth_lower", "tongue")))
     for shape in SHAPES:
-        off = np.abs(back.shapes[shape] - template.shapes[shape]).max(axis=1) / height
-        assert off[skin].max() < 1e-6, shape
-        assert off[inside].max() < 4e-3, shape          # a jaw that glides is told as one that turns
+        assert np.abs(back.shapes[shape] - template.shapes[shape]).max() < 1e-6 * height, shape
 
 
 def test_a_folder_of_obj_files_gives_itself(obj_folder, tmp_path):
