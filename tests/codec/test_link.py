@@ -140,11 +140,11 @@ def test_silence_ends_a_stream_and_keeps_it():
 
 
 def test_noise_does_not_keep_a_receiver():
-    stop = threading.Event()
+    packets, stop = encode_performance(TRUTH)[:3], threading.Event()
 
     def send(port):
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as udp:
-            for one in encode_performance(TRUTH)[:3]:
+            for one in packets:
                 udp.sendto(one, ("127.0.0.1", port))
             while not stop.wait(0.05):
                 udp.sendto(b"noise", ("127.0.0.1", port))

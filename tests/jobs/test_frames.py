@@ -222,7 +222,7 @@ def test_a_folder_that_cannot_be_written(tmp_path, monkeypatch):
 
 def test_killed_in_mid_run_it_goes_on(tmp_path):
     script = tmp_path / "clip.yaml"
-    script.write_text("duration: 20\nidle: 3\n")
+    script.write_text("duration: 8\nidle: 3\n")
     out = tmp_path / "a.apng"
     argv = [sys.executable, "-m", "facegen", "animate", str(script), "-o", str(out), "--face", "akimoto-1986", "--size",
             "32", "--fps", "5", "--workers", "2", "--renderer", "soft"]
@@ -234,15 +234,15 @@ def test_killed_in_mid_run_it_goes_on(tmp_path):
     os.kill(run.pid, signal.SIGKILL)
     run.wait()
     before = len(list(work.glob("frame_*.png")))
-    assert 5 <= before < 100
+    assert 5 <= before < 40
     assert not out.exists()
     done = subprocess.run([*argv, "--json"], capture_output=True, text=True, timeout=120, check=True)
     told = json.loads(done.stdout)
-    assert told["made"] + told["kept"] == told["frames"] == 100
+    assert told["made"] + told["kept"] == told["frames"] == 40
     assert told["kept"] >= before
     assert sorted(tmp_path.iterdir()) == [out, script]
     with Image.open(out) as film:
-        assert film.n_frames > 50
+        assert film.n_frames > 20
 
 
 def test_a_folder_with_a_films_name(tmp_path):
