@@ -15,12 +15,12 @@ from functools import cache
 from pathlib import Path
 
 from facegen.data import tables_dir
-from facegen.errors import InputError, NotationError, nearest
+from facegen.errors import InputError, NotationError, TableError, nearest
 from facegen.facs.notation import looks_like_units, parse
 from facegen.facs.own_units import OwnUnit, read_own_units
 from facegen.facs.units import Catalogue, load_catalogue
 from facegen.facs.validate import Entry
-from facegen.facs.yamlfile import SUFFIXES, read_data
+from facegen.facs.yamlfile import SUFFIXES, line_of, read_data
 
 HABITS = ("overrides", "adds", "aliases", "units")
 """Keys of a person's table, of which one at least is there."""
@@ -179,7 +179,24 @@ def _aliases(table: Mapping[str, Expression], entries: Mapping[str, Entry]) -> d
 
 
 def _read_person(path: Path, common: ExpressionTable) -> Person:
-    return person_from_data(read_data(path), str(path), name=path.stem, expressions=common)
+    person = person_from_data(read_data(path), str(path), name=path.stem, expressions=common)
+    if person.units:
+        check_movements(person, path.read_text(encoding="utf-8-sig"), str(path))
+    return person
+
+
+def check_movements(person: Person, text: str, source: str) -> None:
+    """Raise TableError, with the line, for a feature point or fold in a person's units that no face has.
+
+    text: of the file that they were read from; source: its name.
+    """
+    from facegen.facs.tables import load_units  # which reads expressions, too
+
+    try:
+        load_units().own_basis(person)
+    except TableError as error:
+        place, _, why = str(error).removeprefix(f"{source}: ").partition(": ")
+        raise TableError(f"{source}: line {line_of(text, place.split('.'))}: {place}: {why}") from None
 
 
 def person_from_data(data: object, source: str = "person", *, name: str = "person",

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from facegen.errors import FileError, InputError
-from facegen.facs.expression_table import HABITS, Person, person_from_data
+from facegen.facs.expression_table import HABITS, Person, check_movements, person_from_data
 from facegen.facs.yamlfile import parse_bytes, parse_yaml
 from facegen.facs.yamltext import entry_lines, yaml_text
 from facegen.fileio.textfile import check_place, save_text
@@ -69,7 +69,7 @@ def read_person_data(content: bytes, name: str, *, most: int | None = None) -> d
     data = parse_bytes(content, name)
     if most is not None:
         check_count(data, most, name)
-    person_from_data(data, name)
+    check_movements(person_from_data(data, name), content.decode("utf-8-sig"), name)
     return data
 
 

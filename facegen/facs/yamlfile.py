@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import json
 import re
+from collections.abc import Sequence
 from pathlib import Path
 
 from facegen.errors import FileError, TableError
@@ -90,6 +91,21 @@ def parse_yaml(text: str, source: str) -> object:
         raise TableError(f"{source}: {_describe(error)}") from error
     finally:
         loader.dispose()
+
+
+def line_of(text: str, keys: Sequence[str]) -> int:
+    """Return the line, from 1, on which a path of keys stands in a YAML or JSON text that can be read; where a key is
+    not there, the line of what holds it."""
+    import yaml
+
+    node, line = yaml.compose(text, getattr(yaml, "CSafeLoader", yaml.SafeLoader)), 1
+    for key in keys:
+        inner = {one.value: (one, value) for one, value in node.value} if node.id == "mapping" else {}
+        if key not in inner:
+            break
+        mark, node = inner[key]
+        line = mark.start_mark.line + 1
+    return line
 
 
 def _describe(error: Exception) -> str:

@@ -13,6 +13,7 @@ from facegen.animation.script import load_clip, morph
 from facegen.errors import InputError, TableError
 from facegen.facs.expression_table import load_person, person_from_data
 from facegen.facs.expressions import resolve
+from facegen.facs.person_file import read_person_data
 from facegen.facs.tables import load_units
 from facegen.facs.yamlfile import parse_yaml
 
@@ -79,6 +80,24 @@ def test_wrong_units_are_refused_with_their_place(units, words):
 def test_a_name_that_no_face_has_is_refused_when_it_is_used(data, words):
     with pytest.raises(TableError, match=words):
         resolve("12", person=someone(u12=data))
+
+
+@pytest.mark.parametrize(("name", "text", "line"), [
+    ("ada.yaml", "units:\n  17: {scale: 0.5}\n  12:\n    jaw: {open: 3}\n    points:\n      chin: [0, 0.1, 0]\n"
+     "      mouth_cornr_L: [0, 0.1, 0]\n", 9),
+    ("ada.yaml", "units:\n  12: {points: {mouth_cornr_L: [0, 0.1, 0]}}\n", 4),
+    ("ada.json", '"units": {\n"12": {"points": {\n"mouth_cornr_L": [0, 0.1, 0]}}}}', 3)])
+def test_a_file_that_names_no_point_is_refused_when_it_is_read(tmp_path, name, text, line):
+    path = tmp_path / name
+    head = "about: a\nsource: b\n" if name.endswith("yaml") else '{"about": "a", "source": "b", '
+    path.write_text(head + text)
+    said = rf"line {line}: units\.12\.points\.mouth_cornr_L: unknown feature point .* did you mean 'mouth_corner_L'"
+    with pytest.raises(TableError, match=f"^{re.escape(str(path))}: {said}"):
+        load_person(path)
+    with pytest.raises(TableError, match=f"^{re.escape(name)}: {said}"):
+        read_person_data(path.read_bytes(), name)
+    path.write_text(path.read_text().replace("cornr", "corner"))
+    assert load_person(path).units
 
 
 def test_a_face_moves_as_the_person_and_the_rest_as_everybody():

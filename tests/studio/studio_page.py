@@ -4,7 +4,11 @@ from __future__ import annotations
 
 import base64
 import io
+import json
+import os
 import re
+import shutil
+import subprocess
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -17,6 +21,7 @@ FLAGS = ("--headless=new", "--no-sandbox", "--disable-gpu", "--disable-quic", "-
          "--disable-background-networking", "--disable-component-update", "--disable-sync", "--use-gl=angle",
          "--use-angle=swiftshader", "--enable-unsafe-swiftshader")
 SIZE = {"width": 900, "height": 600}
+VALIDATE = Path(__file__).parents[1] / "judges" / "validate.cjs"
 SECONDS = 60.0          # long: a shared machine, and pixels drawn without a GPU
 # viser's sorter of Gaussian splats, of which the studio shows none, compiles text, and our policy lets no page do that.
 _NO_SPLATS = "Evaluating a string as JavaScript violates"
@@ -48,6 +53,19 @@ def difference(one: np.ndarray, other: np.ndarray) -> float:
     apart = one[:rows, :columns].astype(float) - other[:rows, :columns]
     blocks = np.abs(apart.reshape(rows // 4, 4, columns // 4, 4, 3).mean(axis=(1, 3)))
     return float((blocks.max(axis=2) > 24).mean())
+
+
+def judged(path: Path) -> None:
+    """Have Khronos' validator look at a file, if it is there; see tests/judges."""
+    folder = os.environ.get("FACEGEN_JUDGES")
+    if not folder or shutil.which("node") is None:
+        assert not os.environ.get("FACEGEN_CI"), "FACEGEN_JUDGES names no folder with gltf-validator"
+        return
+    done = subprocess.run(["node", str(VALIDATE), folder, str(path)], capture_output=True, text=True, timeout=60,
+                          check=True)
+    report = json.loads(done.stdout)
+    assert [one for one in report["issues"]["messages"] if one["severity"] < 2] == []
+    assert report["info"]["hasMorphTargets"]
 
 
 class StudioPage:

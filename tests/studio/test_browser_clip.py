@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
-from studio_page import difference
+import av
+import numpy as np
+from PIL import Image, ImageSequence
+from studio_page import difference, judged
 
 import facegen
 from facegen.studio.clip_panel import ClipPanel
@@ -48,6 +51,34 @@ def test_two_faces_are_keyed_scrubbed_played_and_taken_away(studio, browser_page
     assert 0.999 < found.weights[-1].max() < 1.0    # the last frame is a moment before the key
     assert found.weights[0].max() == 0.0
     assert len(found) == 100                        # 4 s, 25 a second
+    page.set("Pictures a second", 2)
+
+    def saved(form):
+        page.choose("What", form)
+        return page.download(tmp_path, lambda: page.press("Save"))
+
+    page.choose("What", "Moving picture (.gif)")
+    page.choose("Size (pixels)", "256")
+    with Image.open(saved("Moving picture (.gif)")) as film:
+        moves([np.asarray(each.convert("RGB")) for each in ImageSequence.Iterator(film)])
+    with av.open(str(saved("Film (.mp4)"))) as film:
+        moves([frame.to_ndarray(format="rgb24") for frame in film.decode(video=0)])
+    path = saved("Animated head (.glb)")
+    head = facegen.load_performance(path)
+    assert len(head) == 8
+    assert (np.diff(head.column("AU27")) > 0.0).all()
+    assert head.column("AU27")[0] == 0.0
+    assert 0.4 < head.column("AU27")[-1] < 0.6
+    judged(path)
+
+
+def moves(frames):
+    """Check the frames of a film of 4 s: a face at rest opens its mouth, wider and wider."""
+    assert len(frames) == 8
+    assert {frame.shape for frame in frames} == {(256, 256, 3)}
+    away = [difference(frame, frames[0]) for frame in frames]
+    assert away[-1] > max(1.2 * away[4], 0.01)
+    assert away[4] > 0.002
 
 
 def test_a_recording_is_opened_plays_on_any_face_and_is_there_after_a_reload(studio, browser_page, tmp_path):
