@@ -196,7 +196,7 @@ def rig(avatar: str | Path, output: str | Path, *, landmarks: str | Path | None 
 
 @dataclass(frozen=True)
 class _Asked:
-    """What is to be made. ``sets``: shape -> the vocabulary it belongs to, empty if unknown; ``template``: makes it, and
+    """What is to be made. ``sets``: shape -> the vocabulary it belongs to, empty if unknown; ``template``: makes it and
     keeps registrations where it is told to."""
 
     sets: Mapping[str, str]
