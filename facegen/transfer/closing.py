@@ -21,6 +21,7 @@ from facegen.transfer.closing_field import Field, closing_field
 from facegen.transfer.eyeball import EyeFront
 from facegen.transfer.margins import LIPS, SAMPLES, Margins, Slit, facing_margins
 from facegen.transfer.skin import Skin
+from facegen.transfer.template import Template
 
 Array = NDArray[np.float64]
 
@@ -28,8 +29,9 @@ Array = NDArray[np.float64]
 _CORNER = 0.15
 # What the template closes, or opens wider, counts in full from this share of the gap on.
 _LEAST_CHANGE = 0.1
-# Millimetres: lips farther apart than this at some place have parted there.
-_PARTED = 1.0
+# Millimetres: lips farther apart than this at some place have parted there; but where the jaw alone would part them,
+# by that much of the way more: a sculptor's lips that close over an open jaw meet no better.
+_PARTED, _OF_JAW = 1.0, 0.2
 # Millimetres: a miss of this size counts half; on a faithful copy there is none to mend.
 _TOLERATED = 0.05
 # Where a slit stays open, this share of what is left counts as little, up to so many millimetres.
@@ -236,9 +238,10 @@ def closing(skin: Skin, slit: Slit, eye: EyeFront | None = None) -> Closing | No
         return None
     own, margins = found
     template, rest = skin.template, skin.surface.vertices
-    told = _told_lips if slit is LIPS else _told_lids
     upper, lower = (np.stack([edge @ one for one in template.motion]) for edge in (own.upper, own.lower))
-    wanted = told(own.gap(template.surface.vertices), upper, lower, margins.gap(rest), skin.parts.matrices[slit.name])
+    part = skin.parts.matrices[slit.name]
+    wanted = _told_lips(upper - lower, _jaw_alone(template, own), margins.gap(rest), part) if slit is LIPS else \
+        _told_lids(own.gap(template.surface.vertices), upper, lower, margins.gap(rest), part)
     field, lid = closing_field(skin, own, margins), None
     if eye is not None:
         normals = vertex_normals(rest, skin.surface.faces)
@@ -246,10 +249,20 @@ def closing(skin: Skin, slit: Slit, eye: EyeFront | None = None) -> Closing | No
     return Closing(margins, field, rest, margins.gap(rest), lid, wanted)
 
 
-def _told_lips(gap: Array, upper: Array, lower: Array, own_gap: Array, part: Array) -> _Wanted:
-    """Return what the template's lips tell the avatar's: see `_told_lids`."""
-    change = upper - lower
-    parted = np.linalg.norm(change, axis=2) / _PARTED
+def _jaw_alone(template: Template, own: Margins) -> Array:
+    """Return how the template's jaw alone would change the gap between its lips (k, SAMPLES, 3), mm."""
+    if template.hinge is None:
+        return np.zeros((len(template.jaw), SAMPLES, 3))
+    used = np.unique(np.concatenate([own.upper.indices, own.lower.indices]))
+    turned = template.hinge.movement(template.surface.vertices[used], template.jaw)
+    across = (own.upper - own.lower).tocsc()[:, used].toarray()
+    return across @ (template.jaw_share[used, None] * turned)
+
+
+def _told_lips(change: Array, by_jaw: Array, own_gap: Array, part: Array) -> _Wanted:
+    """Return what the template's lips tell the avatar's: see `_told_lids`. change, by_jaw (k, SAMPLES, 3): of the gap,
+    in all and by the jaw alone."""
+    parted = np.linalg.norm(change, axis=2) / (_PARTED + _OF_JAW * np.linalg.norm(by_jaw, axis=2))
     return _Wanted(own_gap + change @ part.T, smooth_step(1.0 - parted), np.full(len(change), 0.5),
                    np.ones(parted.shape))
 

@@ -40,6 +40,7 @@ def test_left_shapes_leave_the_right_side_alone(rigged):
     rows = cKDTree(rigged.found.frame.apply(load_avatar(rigged.path).mesh.vertices)).query(skin.surface.vertices)[1]
     x, clear = skin.registered[:, 0], np.abs(skin.surface.vertices[:, 0]) > 12
     template = skin.template
+    # Not of one side on the template either: what draws all of the mouth to the left, and what turns the jaw.
     whole = {"mouthLeft", *(name for name, jaw in zip(template.names, template.jaw, strict=True) if jaw.any())}
     left = [name for name in rigged.names if name.endswith(("_L", "Left")) and name not in whole]
     assert len(left) > 30

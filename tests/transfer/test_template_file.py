@@ -4,6 +4,7 @@ import shutil
 
 import numpy as np
 import pytest
+from scipy.spatial import cKDTree
 
 from facegen.cli import main
 from facegen.data import meshes_dir
@@ -16,9 +17,10 @@ from facegen.geometry.mesh import Mesh
 from facegen.transfer.alignment import align
 from facegen.transfer.apart import take_apart
 from facegen.transfer.landmarks import load_landmarks
+from facegen.transfer.margins import LIPS, facing_margins
 from facegen.transfer.measured_motion import measured_gaze, measured_jaw
 from facegen.transfer.piece_motion import PieceMotion
-from facegen.transfer.rig import rig
+from facegen.transfer.rig import Rigging, avatar_path, rig
 from facegen.transfer.template_file import read_template
 from facegen.transfer.transfer import transfer
 
@@ -106,6 +108,20 @@ def test_one_rigged_avatar_is_the_template_of_another(human, tmp_path):
     face = load_face(out)
     smile = face.landmark_points(face.pose_shapes({"mouthSmileLeft": 1.0}))["mouth_corner_L"]
     assert (smile - face.landmark_points(face.mesh().vertices)["mouth_corner_L"])[1] > 1.0
+
+
+@pytest.mark.parametrize("avatar", ["cat", "cartoon"])
+def test_lips_meet_over_an_open_jaw_as_another_avatars_do(human, avatar):
+    found = Rigging(avatar, template=human, shapes=["jawOpen", "mouthClose"]).shapes()
+    mesh = load_avatar(avatar_path(avatar)).mesh
+    rows = cKDTree(found.frame.apply(mesh.vertices)).query(found.skin.surface.vertices)[1]
+    opened, closed = (found.frame.apply_vectors(found.shapes[name][rows]) for name in ("jawOpen", "mouthClose"))
+    _, lips = facing_margins(found.skin, LIPS)
+    at = found.skin.surface.vertices
+    rest, wide, shut = (np.linalg.norm(lips.gap(places), axis=1).mean() for places in (
+        at, at + opened, at + opened + closed))
+    assert wide > 10.0                      # mm of a human-sized head
+    assert abs(shut - rest) < 0.05 * (wide - rest)
 
 
 def test_a_corrective_alone_brings_what_it_corrects_along_but_does_not_write_it(cartoon, tmp_path):
