@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +13,7 @@ from scipy.spatial import cKDTree
 from facegen.errors import InputError
 from facegen.geometry.normals import vertex_normals
 from facegen.geometry.operators import Surface
+from facegen.landmarking.confidence import A_FACE
 from facegen.landmarking.far import OTHERS, SKULL, skull_ends
 from facegen.landmarking.features import eye_opening, lip_line, nose_tip
 from facegen.landmarking.fit import BENT, Laid, lay, likeness
@@ -32,6 +34,9 @@ _SAMPLES, _FEWEST = 1500, 20
 # A known place's mirror image is this near to its partner, mm of the base face; a place of a laid face to the one that
 # is meant.
 _MIRRORED_OFF, _LAID_OFF = 3.0, 3.0
+# On a person's face eyeballs and brows say where lids and brows are if those were laid farther beside them than this,
+# mm: a child's eyes are lower in the face. Nearer, what was laid is as good.
+_BESIDE = {"eye_": 4.0, "brow_": 7.0}
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,10 +65,10 @@ def of_face(head: Head, skin: Skin, model: FaceModel, laid: Laid, alike: float, 
     plane, seen = plane_of(head, laid.frame), {}
     if sure:
         search = skin.search
-        seen = _seen(head, skin, plane, model, laid)
+        seen = _seen(head, skin, plane, model, laid, alike)
         hold = {name: laid.frame.apply(place) for name, place in seen.items() if name in model.names}
         laid = lay(model, search, laid.frame, hold, BENT[-4:], laid.vertices)
-        seen = _seen(head, skin, plane, model, laid)
+        seen = _seen(head, skin, plane, model, laid, alike)
         alike = max(alike, likeness(model, laid, search))
     places = {**_points(model, laid), **seen}
     normals = dict(zip(model.names, model.placing @ vertex_normals(laid.vertices, model.surface.faces), strict=True))
@@ -116,12 +121,17 @@ def _points(model: FaceModel, laid: Laid) -> dict[str, Array]:
     return dict(zip(model.names, model.placing @ laid.vertices, strict=True))
 
 
-def _seen(head: Head, skin: Skin, plane: Plane, model: FaceModel, laid: Laid) -> dict[str, Array]:
+def _seen(head: Head, skin: Skin, plane: Plane, model: FaceModel, laid: Laid, alike: float
+          ) -> dict[str, Array]:
     """Return what is seen of a laid face's lids, lips and nose, name -> place (3,) in the base face's frame."""
     frame, back = laid.frame, laid.frame.inverse()
     points = _points(model, laid)
     found = seen_on(head, plane, {name: frame.apply(place) for name, place in points.items()}, {})
     found = {name: back.apply(place) for name, place in found.items() if not name.startswith("eye_inner")}
+    for part, s in product(_BESIDE, "LR") if alike >= A_FACE else ():
+        own = [name for name in found if name.startswith(part) and name.endswith(s) and name in points]
+        if own and np.linalg.norm(np.mean([found[name] - points[name] for name in own], axis=0)[:2]) < _BESIDE[part]:
+            found = {name: place for name, place in found.items() if name not in own}
     near = {**points, **{name: place for name, place in found.items() if name.startswith("eye_")}}
     front = Surface(back.apply(head.mesh.vertices), skin.surface.faces)
     return found | lip_line(front, near) | nose_tip(front, near) | eye_opening(front, near, "L") \

@@ -72,7 +72,7 @@ def ball_of_eye(balls: Sequence[Ball], points: Mapping[str, Array], s: str, know
     for ball in balls:
         if not _RADII[0] * wide < ball.radius < _RADII[1] * wide:
             continue
-        off = float(np.abs(np.linalg.norm(at - ball.middle, axis=1) / ball.radius - 1.0).max())
+        off = float(np.abs(np.linalg.norm(at - ball.middle, axis=1) / ball.radius - 1.0).mean())
         if off < least:
             best, least = ball, off
     return best

@@ -28,7 +28,8 @@ def skull_ends(head: Head, plane: Plane, frame: Similarity, eyes: Array) -> Mapp
 
     eyes: the middle between the eyes (3,) in that frame. frame: from it to the mesh's.
     """
-    places, _, _ = cut(head.shown_welded, plane, frame.apply(eyes + [0.0, 0.0, -_BACK / 2]), frame.scale * _BACK)
+    middle = eyes - np.array([0.0, 0.0, _BACK / 2])
+    places, _, _ = cut(head.shown_welded, plane, frame.apply(middle), frame.scale * _BACK)
     if not len(places):
         return {}
     off = frame.inverse().apply(places) - eyes

@@ -72,7 +72,8 @@ def follow_laid(laid: Mapping[str, Array], rest: Mapping[str, Array], seen: Sequ
     for axis, sign in enumerate((-1.0, 1.0, 1.0)):
         kernel = deviation[:, None] * deviation * (near + sign * _BOTH * near[:, mirror])
         off = np.array([known[names[i]][axis] for i in rows]) - places[rows, axis]
-        moved[:, axis] += kernel[:, rows] @ np.linalg.solve(kernel[np.ix_(rows, rows)] + CLICK**2 * np.eye(len(rows)), off)
+        within = kernel[np.ix_(rows, rows)] + CLICK**2 * np.eye(len(rows))
+        moved[:, axis] += kernel[:, rows] @ np.linalg.solve(within, off)
     return dict(zip(names, moved, strict=True))
 
 

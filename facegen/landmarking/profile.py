@@ -22,6 +22,8 @@ Array = NDArray[np.float64]
 _WAY, _LEAST, _OPEN = 3.0, 0.12, 0.5
 # The curve begins this near to the tip of the nose and to the chin, as a share of the way between.
 _NEAR = 0.25
+# Lips lie between the two by at least this share of the way.
+_WITHIN = 0.03
 
 
 def lips_in_profile(skin: Surface, plane: Plane, nose: Array, chin: Array) -> tuple[Array, Array] | None:
@@ -35,13 +37,26 @@ def lips_in_profile(skin: Surface, plane: Plane, nose: Array, chin: Array) -> tu
         return None
     length = np.linalg.norm(places[first] - places[second], axis=1)
     graph = sparse.coo_array((np.maximum(length, 1e-12 * size), (first, second)), shape=(len(places),) * 2).tocsr()
-    tree = cKDTree(places)
-    off, (start, end) = tree.query(np.array([nose, chin]))
+    off, (start, end) = cKDTree(places).query(np.array([nose, chin]))
     if off.max() > _NEAR * size:
         return None
+    far = dijkstra(graph, directed=False, indices=end)
+    if np.isfinite(far[start]):
+        found = _slit(graph, places, start, end, size)
+    else:                                       # a nose of its own, or a mouth whose inside is open at its back
+        lower, upper = np.isfinite(far), np.isfinite(dijkstra(graph, directed=False, indices=start))
+        rows = np.flatnonzero(lower)
+        begin = rows[int(((places[rows] - nose) ** 2).sum(axis=1).argmin())]
+        found = _slit(graph, places, begin, end, size) or _gap(places[upper], places[lower], size)
+    if found is None:
+        return None
+    share = [float((one - nose) @ (chin - nose)) / size**2 for one in found]
+    return found if min(share) > _WITHIN and max(share) < 1 - _WITHIN else None
+
+
+def _slit(graph: sparse.csr_array, places: Array, start: int, end: int, size: float) -> tuple[Array, Array] | None:
+    """Return the two places on the way from one place to another between which it runs in and out again."""
     far, before = dijkstra(graph, directed=False, indices=start, return_predecessors=True)
-    if not np.isfinite(far[end]):
-        return _between_two(graph, places, start, end, size)
     way = [end]
     while way[-1] != start:
         way.append(int(before[way[-1]]))
@@ -54,13 +69,11 @@ def lips_in_profile(skin: Surface, plane: Plane, nose: Array, chin: Array) -> tu
     return (at[i], at[j]) if gain[i, j] > _LEAST * size else None
 
 
-def _between_two(graph: sparse.csr_array, places: Array, start: int, end: int, size: float
-                 ) -> tuple[Array, Array] | None:
-    """Return the places nearest to each other of two curves: the mouth's inside is open at its back."""
-    upper, lower = (np.flatnonzero(np.isfinite(dijkstra(graph, directed=False, indices=one))) for one in (start, end))
-    off, near = cKDTree(places[lower]).query(places[upper])
+def _gap(upper: Array, lower: Array, size: float) -> tuple[Array, Array] | None:
+    """Return the places (3,) of two curves that are nearest to each other."""
+    off, near = cKDTree(lower).query(upper)
     k = int(off.argmin())
-    return (places[upper[k]], places[lower[near[k]]]) if off[k] < _OPEN * size else None
+    return (upper[k], lower[near[k]]) if off[k] < _OPEN * size else None
 
 
 def cut(skin: Surface, plane: Plane, middle: Array, reach: float) -> tuple[Array, NDArray, NDArray]:

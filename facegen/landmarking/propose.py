@@ -20,7 +20,7 @@ from facegen.face.landmarks import NAMES
 from facegen.geometry.mesh import Mesh
 from facegen.landmarking.confidence import A_FACE, MIRRORED, RECOGNISED, belief, confidence_of, laid_share, sure
 from facegen.landmarking.doubts import not_recognised, odd_places
-from facegen.landmarking.estimate import Estimate, beside_known, of_face, of_known, plane_of
+from facegen.landmarking.estimate import Estimate, beside_known, of_face, of_known
 from facegen.landmarking.fit import Laid
 from facegen.landmarking.following import partner
 from facegen.landmarking.model import FaceModel, face_model
@@ -117,7 +117,7 @@ class Proposer:
         found = self._estimate({name: one.xyz for name, one in given.items()})
         places = dict(given)
         if found is not None:
-            places |= {name: one for name, one in self._placed(found, len(given)).items() if name not in given}
+            places |= {name: one for name, one in self._placed(found, given).items() if name not in given}
         plane = self._head.planes[0] if found is None else found.plane
         for name, one in given.items():
             other = partner(name)
@@ -126,7 +126,9 @@ class Proposer:
         ordered = {name: places[name] for name in NAMES if name in places}
         ask = next((name for name in ASKED if name not in given), None)
         first = self._found
-        where = first.on_mesh if first is not None and first.alike >= A_FACE else None
+        where = None
+        if first is not None and first.alike >= A_FACE:
+            where = {name: at for name, at in first.on_mesh.items() if name in first.normals or name in first.seen}
         face = 0.0 if first is None else sure(first.alike)
         errors, odd = odd_places(given, self.mesh, where)
         return Proposals(ordered, face, (*not_recognised(face, given), *errors, *odd), ask,
@@ -147,9 +149,9 @@ class Proposer:
         off = [float(np.linalg.norm(where[name] - place)) / found.frame.scale for name, place in known.items()]
         return sure(found.alike) >= RECOGNISED and float(np.median(off)) < _ELSEWHERE
 
-    def _placed(self, found: Estimate, known: int) -> dict[str, Proposal]:
-        """Return the landmarks on the mesh. known: how many are."""
-        skin = self._head.shown if found.laid is None else self._skin
+    def _placed(self, found: Estimate, given: Mapping[str, Proposal]) -> dict[str, Proposal]:
+        """Return the landmarks on the mesh. given: known ones."""
+        skin = self._head.carrying(given.values()) if found.laid is None else self._skin
         points = found.on_mesh
         places = np.array(list(points.values()))
         feet = skin.search(places)
@@ -163,17 +165,17 @@ class Proposer:
             if name.startswith("eye_center"):
                 one, rows = every, self._head.solid
             result[name] = Proposal(name, int(rows[one.faces[i]]), one.weights[i], one.points[i],
-                                    self._confidence(found, name, known), "seen" if name in found.seen else
+                                    self._confidence(found, name, len(given)), "seen" if name in found.seen else
                                     "laid" if name in found.normals else "followed")
         return result
 
     def _confidence(self, found: Estimate, name: str, known: int) -> float:
         """Return how sure a place is, 0 to 1."""
         if found.laid is None:
-            return confidence_of(found.off[name], found.places)
+            return float(confidence_of(found.off[name], found.places))
         believed = belief(found.alike, known)
         if name not in found.normals:
-            return believed * confidence_of(found.off[name], found.places)
+            return float(believed * confidence_of(found.off[name], found.places))
         weight = 1.0 if name in found.seen else min(float(self._weight[name]), 1.0)
         return believed * laid_share(name, name in found.seen) * weight
 

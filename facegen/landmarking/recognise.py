@@ -17,6 +17,10 @@ from facegen.transfer.alignment import Similarity
 
 # So many of the places found are followed to their end.
 _FOLLOWED = 2
+# After so many rounds so many of them are laid on.
+_TRIED, _KEPT = 2, 4
+# One that is less alike than the best by this is followed no further.
+_CLEARLY = 0.1
 # The middle of the base face, mm.
 MIDDLE = np.array([0.0, -35.0, 0.0])
 
@@ -35,20 +39,23 @@ def _followed(head: Head, model: FaceModel, frames: list[Similarity]) -> tuple[L
     if not frames:
         return None
     search = head.shown.search
-    whole = _best_of(head, model, frames)
+    whole = [laid for laid, _ in _best_of(head, model, frames)]
     whole = _best_of(head, model, [frame for laid in whole for frame in (laid.frame, *_beside(laid.frame))])
+    whole = [laid for laid, alike in whole if alike > whole[0][1] - _CLEARLY]
     bent = [lay(model, search, laid.frame, {}, BENT, laid.vertices) for laid in whole]
     alike = [likeness(model, laid, search) for laid in bent]
     best = int(np.argmax(alike))
     return bent[best], alike[best]
 
 
-def _best_of(head: Head, model: FaceModel, frames: list[Similarity]) -> list[Laid]:
-    """Return the faces laid from frames, as a whole, that are most alike."""
+def _best_of(head: Head, model: FaceModel, frames: list[Similarity]) -> list[tuple[Laid, float]]:
+    """Return the faces laid from frames, as a whole, that are most alike, and how alike; the best first."""
     search = head.shown.search
-    laid = [lay(model, search, frame, {}, WHOLE) for frame in frames]
+    laid = [lay(model, search, frame, {}, WHOLE[:_TRIED]) for frame in frames]
+    best = np.argsort([likeness(model, one, search) for one in laid])[::-1][:_KEPT]
+    laid = [lay(model, search, laid[i].frame, {}, WHOLE[_TRIED:], laid[i].vertices) for i in best]
     alike = [likeness(model, one, search) for one in laid]
-    return [laid[i] for i in np.argsort(alike)[::-1][:_FOLLOWED]]
+    return [(laid[i], alike[i]) for i in np.argsort(alike)[::-1][:_FOLLOWED]]
 
 
 def _beside(frame: Similarity) -> Iterator[Similarity]:

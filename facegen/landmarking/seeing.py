@@ -16,6 +16,9 @@ Array = NDArray[np.float64]
 
 # How far off what is seen is, mm of the base face; the inner corner is hidden by the skin that fills it.
 _OFF, _INNER_OFF = 2.0, 4.0
+# A brow lies within so many eye widths of the eye, has so many corners of triangles, and is this wide; it is looked at
+# by shares of its width.
+_BROW_NEAR, _BROW_FEWEST, _BROW_WIDE, _BROW_END = 1.8, 12, 0.4, 0.08
 
 
 def seen_on(head: Head, plane: Plane, points: Mapping[str, Array], known: Mapping[str, Array]) -> dict[str, Array]:
@@ -32,7 +35,29 @@ def seen_on(head: Head, plane: Plane, points: Mapping[str, Array], known: Mappin
     lips = lips_in_profile(head.shown_welded, plane, nose, chin)
     if lips is not None:
         found |= dict(zip(("mouth_inner_top", "mouth_inner_bottom"), lips, strict=True))
+    found |= _named_brows(head, plane, {**points, **known})
     return {name: place for name, place in found.items() if name not in known and np.isfinite(place).all()}
+
+
+def _named_brows(head: Head, plane: Plane, points: Mapping[str, Array]) -> dict[str, Array]:
+    """Return the ends and the middles of brows that are pieces or materials of their own, as their names say."""
+    found: dict[str, Array] = {}
+    for s in "LR":
+        ends = points[f"eye_inner_{s}"], points[f"eye_outer_{s}"]
+        middle, wide = np.mean(ends, axis=0), float(np.linalg.norm(ends[0] - ends[1]))
+        at = head.brows
+        at = at[((at - middle) ** 2).sum(axis=1) < (_BROW_NEAR * wide) ** 2]
+        side = np.sign((ends[1] - ends[0]) @ plane.normal)
+        across = side * (at @ plane.normal - plane.offset)
+        at, across = at[across > 0], across[across > 0]
+        if len(at) < _BROW_FEWEST or np.ptp(across) < _BROW_WIDE * wide:
+            continue
+        low, high = across.min(), across.max()
+        for name, share in (("inner", _BROW_END), ("mid", 0.5), ("outer", 1 - _BROW_END)):
+            near = np.abs(across - low - share * (high - low)) < _BROW_END * (high - low)
+            if near.any():
+                found[f"brow_{name}_{s}"] = at[near].mean(axis=0)
+    return found
 
 
 def off(name: str) -> float:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from functools import cached_property
 from typing import Any
 
@@ -25,6 +26,9 @@ Array = NDArray[np.float64]
 _SMALLEST, _LARGEST, _FARTHEST = 1e-12, 1e12, 1e6
 # Samples by which the planes of symmetry are found: about so many.
 _SAMPLES = 20_000
+# Landmarks that may lie on an eye or on brows of their own.
+_NOT_SKIN = ("eye_center", "brow")
+_BROWS = frozenset({"brow", "brows", "eyebrow", "eyebrows"})
 
 
 class Skin:
@@ -60,6 +64,7 @@ class Head:
         if not len(self.solid):
             raise InputError("mesh: none of its triangles has an area")
         self.surface = Surface(mesh.vertices, mesh.faces[self.solid])
+        self._carrying: dict[frozenset[int], Skin] = {}
 
     @cached_property
     def search(self) -> ClosestPoints:
@@ -85,6 +90,16 @@ class Head:
                             for material in self.mesh.materials] for part in self.mesh.parts])
         hidden = inside[self.mesh.face_parts, self.mesh.face_materials][self.solid]
         return Skin(self.mesh, self.solid[~hidden] if not hidden.all() else self.solid)
+
+    def carrying(self, given: Iterable[Proposal]) -> Skin:
+        """Return the pieces that carry known places: without hair, whiskers and eyes that have none."""
+        pieces = frozenset(int(self.components[self.mesh.faces[one.face, 0]]) for one in given
+                           if not one.name.startswith(_NOT_SKIN))
+        if pieces not in self._carrying:
+            shown = self.shown.rows
+            rows = shown[np.isin(self.components[self.mesh.faces[shown, 0]], list(pieces))]
+            self._carrying[pieces] = Skin(self.mesh, rows) if len(rows) else self.shown
+        return self._carrying[pieces]
 
     @cached_property
     def welded(self) -> tuple[Array, NDArray]:
@@ -118,6 +133,13 @@ class Head:
     def balls(self) -> list[Ball]:
         """Its round pieces."""
         return balls_of(self.surface, self.components)
+
+    @cached_property
+    def brows(self) -> Array:
+        """Corners (b, 3) of the triangles that are brows, as names say."""
+        own = np.array([[bool((words_of(part) | words_of(material)) & _BROWS) for material in self.mesh.materials]
+                        for part in self.mesh.parts])[self.mesh.face_parts, self.mesh.face_materials][self.solid]
+        return self.surface.corners[own].reshape(-1, 3)
 
     def given(self, name: str, place: Any) -> Proposal:
         """Return a known place as a proposal: a point (3,), or (triangle, barycentric (3,)); InputError for others."""

@@ -94,7 +94,7 @@ def test_a_places_partner_is_proposed_after_one_click(human):
 
 @pytest.mark.parametrize(("click", "at", "said"), [
     ("eye_outer_L", "eye_outer_R", "on the side of 'eye_outer_R'"), ("chin", "nose_tip", "'nose_tip' seems to be"),
-    ("nose_tip", "head_back", "far from where it seems to be")])
+    ("nose_tip", "head_back", "'head_back' seems to be"), ("nose_tip", "neck", "far from where it seems to be")])
 def test_a_misplaced_click_is_told_at_once(human, click, at, said):
     proposer, true = human
     assert any(said in one for one in proposer.propose({click: true[at]}).warnings)
