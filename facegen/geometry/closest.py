@@ -29,6 +29,8 @@ _SAME, _ALIKE = 1e-9, 1e-6
 # built, so that few are as far, and the order of a file's triangles decides nothing.
 _WAY = np.array([0.7391, 0.5823, 0.3382])
 _TINY = 1e-300
+# Because to start threads takes longer than to look for so many points.
+_MANY = 3000
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,7 +79,7 @@ class ClosestPoints:
         """
         points = np.asarray(points, float)
         k, rows = min(_TRIED, len(self._owner)), np.arange(len(points))
-        apart, near = self._tree.query(points, k=k, workers=-1)
+        apart, near = self._tree.query(points, k=k, workers=-1 if len(points) > _MANY else 1)
         near, apart = self._owner[near.reshape(len(points), k)], apart.reshape(len(points), k)
         facing = np.ones(near.shape) if normals is None else \
             np.einsum("pi,pki->pk", normals, self.surface.normals[near])

@@ -27,19 +27,21 @@ def not_recognised(face: float, given: Mapping[str, Proposal]) -> list[str]:
             "the others are proposed from those"]
 
 
-def odd_places(given: Mapping[str, Proposal], mesh: Mesh, where: Mapping[str, NDArray] | None) -> list[str]:
-    """Return what is odd about known places, a sentence each: see `place_faults`, and what lies astray.
+def odd_places(given: Mapping[str, Proposal], mesh: Mesh, where: Mapping[str, NDArray] | None
+               ) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Return what must be wrong about known places and what is odd, a sentence each: see `place_faults`, and what lies
+    astray.
 
     where: name -> place (3,) where a face was recognised without them, or None.
     """
     if not given:
-        return []
+        return (), ()
     faces = np.array([one.face for one in given.values()], np.int64)
     weights = np.array([one.barycentric for one in given.values()])
     errors, warnings = place_faults(tuple(given), mesh.faces[faces].astype(np.int64), weights, mesh)
     if not errors and where is not None:
-        errors = _astray(given, where)
-    return [*errors, *warnings]
+        warnings = [*_astray(given, where), *warnings]
+    return tuple(errors), tuple(warnings)
 
 
 def _astray(given: Mapping[str, Proposal], where: Mapping[str, NDArray]) -> list[str]:

@@ -7,14 +7,12 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from facegen.geometry.operators import Surface
+from facegen.landmarking.eyeballs import Ball
 from facegen.landmarking.symmetry import Plane
 from facegen.transfer.alignment import Similarity
 
 Array = NDArray[np.float64]
 
-# An eye has at least so many vertices, and its shortest extent is this share of its longest.
-_FEWEST, _ROUND = 12, 0.5
 # Partners' sizes differ by this factor at most, and their places by this share of the radius.
 _ALIKE, _OFF = 1.15, 0.5
 # The middles of eyes are this many radii apart, of people and of cartoons; the base face's so many mm.
@@ -26,28 +24,15 @@ _TURN = 30.0
 _MOST = 2
 
 
-def eye_frames(surface: Surface, planes: Sequence[Plane]) -> list[Similarity]:
+def eye_frames(balls: Sequence[Ball], planes: Sequence[Plane]) -> list[Similarity]:
     """Return from the base face's frame to the mesh's, for every pair of balls and way up."""
-    _, label = surface.components()
-    label = label[surface.faces[:, 0]]
-    used = np.repeat(label, 3)
-    places = surface.corners.reshape(-1, 3)
-    count = np.bincount(used)
-    order = np.argsort(used, kind="stable")
-    balls = []
-    for c, rows in enumerate(np.split(order, np.cumsum(count)[:-1])):
-        if count[c] < 3 * _FEWEST:
-            continue
-        at = places[rows]
-        spread = np.sqrt(np.linalg.eigvalsh(np.cov(at.T))[::-1].clip(0.0))
-        if spread[2] > _ROUND * spread[0]:
-            middle = (at.max(axis=0) + at.min(axis=0)) / 2
-            balls.append((middle, float(np.sqrt(((at - middle) ** 2).sum(axis=1).max()))))
     frames: list[Similarity] = []
     for plane in planes:
         pairs = []
-        for i, (p, r) in enumerate(balls):
-            for q, t in balls[i + 1:]:
+        for i, one in enumerate(balls):
+            p, r = one.middle, one.radius
+            for other in balls[i + 1:]:
+                q, t = other.middle, other.radius
                 apart = float(np.linalg.norm(p - q))
                 if (max(r, t) < _ALIKE * min(r, t) and _APART[0] * r < apart < _APART[1] * r
                         and np.linalg.norm(plane.mirror(p) - q) < _OFF * r):

@@ -45,43 +45,45 @@ _TIP = 12.0
 @dataclass(frozen=True, eq=False)
 class View:
     """A picture of the skin from the front. ``ids`` (h, w): triangles, -1 for none; ``depth`` (h, w): mm ahead, NaN for
-    none; pixel (i, j) shows (``left`` + j, ``top`` - i) times `_PIXEL`."""
+    none; pixel (i, j) shows (``left`` + j, ``top`` - i) times ``pixel``, mm."""
 
     ids: NDArray[np.int32]
     depth: Array
     left: float
     top: float
+    pixel: float = _PIXEL
 
     def place(self, i: int, j: int) -> Array:
         """Return the place (3,) that a pixel shows, mm."""
-        return np.array([self.left + (j + 0.5) * _PIXEL, self.top - (i + 0.5) * _PIXEL, self.depth[i, j]])
+        return np.array([self.left + (j + 0.5) * self.pixel, self.top - (i + 0.5) * self.pixel, self.depth[i, j]])
 
-    def pixel(self, at: Array) -> tuple[int, int]:
+    def pixel_of(self, at: Array) -> tuple[int, int]:
         """Return the pixel (i, j) that shows a place."""
-        i, j = int((self.top - at[1]) / _PIXEL), int((at[0] - self.left) / _PIXEL)
+        i, j = int((self.top - at[1]) / self.pixel), int((at[0] - self.left) / self.pixel)
         return min(max(i, 0), len(self.ids) - 1), min(max(j, 0), self.ids.shape[1] - 1)
 
 
-def view_of(skin: Surface, middle: Array, half: tuple[float, float], deep: float = 60.0) -> View:
+def view_of(skin: Surface, middle: Array, half: tuple[float, float], deep: float = 60.0, pixel: float = _PIXEL
+            ) -> View:
     """Return a picture of a skin in the base face's frame, mm: of what lies within ``half`` of a place, aside and up,
     and not much farther back."""
     low, high = skin.corners.min(axis=1), skin.corners.max(axis=1)
     near = ((high[:, 0] > middle[0] - half[0]) & (low[:, 0] < middle[0] + half[0])
             & (high[:, 1] > middle[1] - half[1]) & (low[:, 1] < middle[1] + half[1]) & (high[:, 2] > middle[2] - deep))
     rows = np.flatnonzero(near)
-    width, height = (round(2 * one / _PIXEL) for one in half)
+    width, height = (round(2 * one / pixel) for one in half)
     left, top = middle[0] - half[0], middle[1] + half[1]
     if not len(rows):
-        return View(np.full((height, width), -1, np.int32), np.full((height, width), np.nan), left, top)
+        return View(np.full((height, width), -1, np.int32), np.full((height, width), np.nan), left, top, pixel)
     points = skin.corners[rows].reshape(-1, 3)
     back, front = points[:, 2].min(), points[:, 2].max()
     span = max(front - back, 1e-9)
-    pixels = np.column_stack([(points[:, 0] - left) / _PIXEL, (top - points[:, 1]) / _PIXEL,
+    pixels = np.column_stack([(points[:, 0] - left) / pixel, (top - points[:, 1]) / pixel,
                               0.01 + 0.98 * (points[:, 2] - back) / span])
     ids, nearness = scan(prepare(pixels, np.arange(len(points)).reshape(-1, 3), width=width, height=height, samples=1))
     ids, nearness = ids[:, 0], nearness[:, 0].astype(float)
     depth = np.where(ids >= 0, back + (nearness - 0.01) / 0.98 * span, np.nan)
-    return View(np.where(ids >= 0, rows[ids], -1).astype(np.int32), depth, left, top)
+    return View(np.where(ids >= 0, rows[ids], -1).astype(np.int32), depth, left, top, pixel)
 
 
 def eye_opening(skin: Surface, points: Mapping[str, Array], s: str) -> dict[str, Array]:
@@ -147,7 +149,7 @@ def lip_line(skin: Surface, points: Mapping[str, Array]) -> dict[str, Array]:
     back = (corners[0][2] + corners[1][2]) / 2 - middle[2]                  # lips curve back round the teeth
     shown = (view.ids >= 0) & (np.nan_to_num(view.depth, nan=-np.inf) > middle[2] + back * aside**2 - _CAVITY)
     jump[~shown] = np.where(_between(shown), 1.0, -1.0)[~shown]             # an open mouth is a line as well
-    i0, j0 = view.pixel(middle)
+    i0, j0 = view.pixel_of(middle)
     band = round(_BAND / _PIXEL)
     low, high = max(i0 - band, 0), min(i0 + band + 1, len(jump))
     window = jump[low:high, max(j0 - 2, 0):j0 + 3].mean(axis=1)

@@ -59,8 +59,8 @@ class Laid:
 def lay(model: FaceModel, search: ClosestPoints, start: Similarity, known: Mapping[str, Array],
         rounds: tuple[Round, ...], bent: Array | None = None) -> Laid:
     """Return the face laid on a mesh. start: from its frame to the mesh's. known: name -> place (3,) on the mesh.
-    bent (n, 3): where it starts, in its own frame, mm. As a whole (`WHOLE`) it needs few of its vertices and ways."""
-    whole = rounds is WHOLE
+    bent (n, 3): where it starts, in its own frame, mm. In `WHOLE`'s rounds it needs few of its vertices and ways."""
+    whole = rounds[0].stiff > BENT[0].stiff
     some, few = slice(None, None, _EVERY if whole else _EVERY - 1), _FEW if whole else model.ways.shape[1]
     ways, stiffness, areas = model.ways[:, :few], model.stiffness[:few], model.areas[some]
     own_ways, at_start = ways[some], model.surface.vertices[some]

@@ -35,8 +35,8 @@ _TINY = 1e-12
 @dataclass(frozen=True, eq=False)
 class FaceModel:
     """``surface``: the front of the face, n vertices, mm. ``normals`` (n, 3); ``ways`` (n, k), orthonormal by area,
-    and ``stiffness`` (k,) of each, the bending energy of one millimetre. ``names`` and ``placing`` (l, n): where the
-    landmarks lie on it. ``partner`` (n,): each vertex' mirror image."""
+    and ``stiffness`` (k,) of each, the bending energy of one millimetre. ``names`` and ``placing`` (l, n): where
+    landmarks lie on it. ``rest``: name -> place (3,), mm, of all landmarks, also those behind the front."""
 
     surface: Surface
     normals: Array
@@ -45,11 +45,7 @@ class FaceModel:
     stiffness: Array
     names: tuple[str, ...]
     placing: sparse.csr_array
-
-    @property
-    def points(self) -> Mapping[str, Array]:
-        """Name -> place (3,) of the landmarks, mm."""
-        return dict(zip(self.names, self.placing @ self.surface.vertices, strict=True))
+    rest: Mapping[str, Array]
 
 
 @cache
@@ -74,9 +70,12 @@ def face_model() -> FaceModel:
         for corner, weight in zip(corners, weights, strict=True):
             if weight > 0:
                 placing[row, own[corner]] += weight
+    placing = sparse.csr_array(placing)
+    rest = {**face.landmark_points(mesh.vertices, detail=_DETAIL),
+            **dict(zip(names, placing @ surface.vertices, strict=True))}
     ways, stiffness = _ways(surface)
     return FaceModel(surface, vertex_normals(surface.vertices, surface.faces), surface.vertex_areas, ways, stiffness,
-                     tuple(names), sparse.csr_array(placing))
+                     tuple(names), placing, rest)
 
 
 def _ways(surface: Surface) -> tuple[Array, Array]:

@@ -25,7 +25,8 @@ ASKED = ("eye_outer_L", "eye_outer_R", "nose_tip", "mouth_corner_L", "mouth_corn
 @dataclass(frozen=True, eq=False)
 class Proposal:
     """A place for a landmark: on triangle ``face`` with ``barycentric`` (3,), at ``xyz`` (3,) in the mesh's axes and
-    units. ``confidence``: 0 to 1; ``why``: "given", "mirrored", "laid" and so on; ``given``: known before."""
+    units. ``confidence``: 0 to 1; ``why``: "given", "mirrored", "seen" (on the mesh itself), "laid" (with the
+    base face) or "followed" (from known ones); ``given``: known before."""
 
     name: str
     face: int
@@ -43,8 +44,11 @@ class Proposal:
 @dataclass(frozen=True, eq=False)
 class Proposals(Mapping[str, Proposal]):
     """Name -> `Proposal`, in the order of the list of landmarks. ``face``: how surely there is a face, 0 to 1.
-    ``warnings``: a sentence each. ``ask``: the place to ask for next, or None when all required ones are known.
-    ``frame``: from the base face's axes and millimetres to the mesh's, or None where no face is."""
+
+    ``warnings``: a sentence each; ``errors``: those of them about what must be wrong. ``ask``: the place to ask for
+    next, or None when all required ones are known. ``frame``: from the base face's axes and millimetres to the mesh's,
+    or None where no face is.
+    """
 
     places: Mapping[str, Proposal]
     face: float
@@ -52,6 +56,7 @@ class Proposals(Mapping[str, Proposal]):
     ask: str | None = None
     frame: Similarity | None = None
     mesh: Mesh | None = field(default=None, repr=False)
+    errors: tuple[str, ...] = ()
 
     def __getitem__(self, name: str) -> Proposal:
         return self.places[name]

@@ -19,11 +19,10 @@ from facegen.landmarking.confidence import RECOGNISED
 from facegen.landmarking.propose import Proposer, Searched
 from facegen.studio.apart import Waits, patient
 from facegen.studio.landmark_words import ORDER, partner
-from facegen.studio.picking import Place, as_landmarks, place, point
+from facegen.studio.picking import Place, place, point
 from facegen.studio.placement import axes, nearest_axes
 from facegen.studio.reading import search_safely
 from facegen.studio.work import AvatarWork
-from facegen.transfer.landmark_checks import place_faults
 
 Array = NDArray[np.float64]
 
@@ -98,11 +97,11 @@ class Adviser:
         self.ready = True
         guesses = {name: proposed[name] for name in ORDER if name in proposed and name not in known
                    and proposed[name].confidence >= _LEAST}
-        errors = self._errors(work)
         return Advice({name: place(one.face, one.barycentric) for name, one in guesses.items()},
                       {name: one.confidence for name, one in guesses.items()}, proposed.ask, proposed.face,
                       nearest_axes(proposed.frame.rotation.T) if proposed.face >= FOUND and proposed.frame else None,
-                      errors, (*self._odd, *(each for each in proposed.warnings if each not in errors)))
+                      proposed.errors,
+                      (*self._odd, *(each for each in proposed.warnings if each not in proposed.errors)))
 
     def _searched(self, waits: Waits) -> Searched:
         try:
@@ -111,13 +110,6 @@ class Adviser:
             self._odd = ("No face could be looked for: it takes too long or too much. Place some points, and the "
                          "others are proposed.",)
             return Searched()
-
-    def _errors(self, work: AvatarWork) -> tuple[str, ...]:
-        """Return what must be wrong about the points of a work, a sentence each."""
-        if not work.landmarks:
-            return ()
-        marks = as_landmarks(self.mesh, work.landmarks)
-        return tuple(place_faults(marks.names, marks.corners, marks.barycentric, self.mesh)[0])
 
     def nearest(self, at: Array) -> Place:
         """Return the place of the mesh that is nearest to a point (3,), in the mesh's units."""

@@ -118,10 +118,18 @@ def test_a_places_partner_is_proposed_after_one_click(human):
 
 @pytest.mark.parametrize(("click", "at", "said"), [
     ("eye_outer_L", "eye_outer_R", "on the side of 'eye_outer_R'"), ("chin", "nose_tip", "'nose_tip' seems to be"),
-    ("nose_tip", "head_back", "far from where it seems to be")])
+    ("nose_tip", "head_back", "'head_back' seems to be"), ("nose_tip", "neck", "'neck' seems to be")])
 def test_a_misplaced_click_is_told_at_once(human, click, at, said):
     proposer, true = human
     assert any(said in one for one in proposer.propose({click: true[at]}).warnings)
+
+
+def test_a_click_far_from_all_landmarks_is_told(human):
+    proposer, true = human
+    places = proposer.mesh.vertices
+    nearest = np.linalg.norm(places[:, None] - np.array(list(true.values())), axis=2).min(axis=1)
+    found = proposer.propose({"nose_tip": places[nearest.argmax()]})
+    assert any("far from where it seems to be" in one for one in found.warnings)
 
 
 def test_six_places_are_asked_for_where_no_face_is():

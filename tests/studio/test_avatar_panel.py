@@ -9,6 +9,7 @@ import pytest
 from fake_client import FakeClient
 
 from facegen.face.landmarks import REQUIRED
+from facegen.landmarking.doubts import odd_places
 from facegen.landmarking.propose import Proposal, Proposals
 from facegen.studio import picking, proposing
 from facegen.studio.avatar_panel import AvatarPanel
@@ -77,7 +78,10 @@ class Blind:
     def propose(self, known):
         places = {name: Proposal(name, one["face"], np.array(one["barycentric"]), point(self.mesh, one), sure, "laid")
                   for name, (one, sure) in self.found.items() if name not in known}
-        return Proposals(places, 0.0, (), None, self.mesh)
+        given = {name: Proposal(name, face, np.array(weights), None, 1.0, "given")
+                 for name, (face, weights) in known.items()}
+        errors, odd = odd_places(given, self.mesh, None)
+        return Proposals(places, 0.0, (*errors, *odd), None, None, self.mesh, errors)
 
 
 @pytest.fixture(autouse=True)

@@ -177,7 +177,7 @@ def test_a_face_is_looked_for_in_the_other_process(tmp_path, monkeypatch):
     path = tmp_path / "half.obj"
     path.write_text(format_obj(facegen.load_face().mesh(0)))
     mesh = load_avatar(path).mesh
-    monkeypatch.setattr(propose, "candidates", lambda *_: pytest.fail("it was looked for here"))
+    monkeypatch.setattr(propose, "recognise", lambda *_: pytest.fail("it was looked for here"))
     adviser, told = Adviser(mesh, path), []
     advice = adviser.advice(AvatarWork(file="half.obj"), told.append)
     assert advice.sure > 0.9
