@@ -18,7 +18,7 @@ from facegen.transfer.alignment import Similarity
 # So many of the places found are followed to their end.
 _FOLLOWED = 2
 # After so many rounds so many of them are laid on.
-_TRIED, _KEPT = 2, 4
+_TRIED, _KEPT = 2, 8
 # One that is less alike than the best by this is followed no further.
 _CLEARLY = 0.1
 # The middle of the base face, mm.

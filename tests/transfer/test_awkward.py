@@ -173,8 +173,9 @@ def opposite(mesh, marks, found, slit):
     rows = cKDTree(found.frame.apply(mesh.vertices)).query(found.skin.surface.vertices)[1]
     _, own = facing_margins(found.skin, slit)
     upper, lower = (rows[own.rows[of][np.argsort(own.at[of])]] for of in (own.is_upper, ~own.is_upper))
-    across = np.linspace(0, len(upper) - 1, len(lower)).round().astype(int)         # each has a partner, none is left
-    return list(zip(upper[across], lower, strict=True))
+    few, many = sorted((upper, lower), key=len)
+    across = np.linspace(0, len(few) - 1, len(many)).round().astype(int)            # each has a partner, none is left
+    return list(zip(few[across], many, strict=True))
 
 
 def test_a_painted_mouth_stays_whole(plain, few):
