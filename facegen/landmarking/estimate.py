@@ -105,8 +105,7 @@ def of_known(head: Head, model: FaceModel, known: Mapping[str, Array]) -> Estima
     places, deviation = follow_kinds(model.rest, own)
     places |= seen
     deviation |= {name: off(name) for name in seen}
-    deviation = {name: max(one, OTHERS) if name.startswith(_BEHIND_FACE) else one for name, one in deviation.items()}
-    return Estimate(frame, places, frozenset(seen), deviation, plane, {})
+    return Estimate(frame, places, frozenset(seen), _less_sure_behind(deviation), plane, {})
 
 
 def _with_skull(head: Head, found: Estimate) -> Estimate:
@@ -114,9 +113,13 @@ def _with_skull(head: Head, found: Estimate) -> Estimate:
     lies askew in the frame, so that its top is elsewhere."""
     eyes = (found.places["eye_center_L"] + found.places["eye_center_R"]) / 2
     ends = skull_ends(head, found.plane, found.frame, eyes)
-    deviation = {name: max(one, OTHERS) if name.startswith(_BEHIND_FACE) else one for name, one in found.off.items()}
     return replace(found, places={**found.places, **ends}, seen=found.seen | ends.keys(),
-                   off={**deviation, **dict.fromkeys(ends, SKULL)})
+                   off={**_less_sure_behind(found.off), **dict.fromkeys(ends, SKULL)})
+
+
+def _less_sure_behind(off: Mapping[str, float]) -> dict[str, float]:
+    """Return how far places may be, mm, where those behind the face were told by its front alone."""
+    return {name: max(one, OTHERS) if name.startswith(_BEHIND_FACE) else one for name, one in off.items()}
 
 
 def _points(model: FaceModel, laid: Laid) -> dict[str, Array]:

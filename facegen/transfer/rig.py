@@ -115,10 +115,10 @@ class Rigging:
         """
         self._asked = asked = _asked(sets, shapes, person, template, template_landmarks)
         self._kept = kept = kept_in("registrations") if cache else None
-        with Aside(lambda: asked.make(kept), useful=not _last.made_of(asked.of)) as template:
+        with Aside(lambda: asked.make(kept), useful=not _last.made_of(asked.of)) as making:
             self.source, self.places, odd = _read(avatar, landmarks)
-            if template.forked:
-                _last.template(asked.of, template.result)
+            if making.forked:
+                _last.template(asked.of, making.result)
         self.warnings = (*odd, *_without_expressions(self.source, asked.sets))
         self._pieces = pieces
         self._binding: Binding | None = None
