@@ -62,5 +62,10 @@ def texts(folder: Path) -> dict[str, str]:
     return {path.name: path.read_text() for path in folder.iterdir() if path.is_file()}
 
 
+def finished(folder: Path) -> set[str]:
+    """The names of the files that are whole; those being written come and go."""
+    return {path.name for path in folder.glob("*.txt")}
+
+
 def begun(folder: Path) -> list[int]:
     return sorted(int(path.name.split("-")[1]) for path in (folder / "log").glob("begun-*"))

@@ -21,7 +21,7 @@ if os.environ.get("FACEGEN_CI"):
 else:
     distributed = pytest.importorskip("distributed")
 
-from tasks import begun, some, texts
+from tasks import begun, finished, some
 
 from facegen.jobs.cluster import connect
 from facegen.jobs.runner import Report, run
@@ -87,7 +87,7 @@ def test_work_is_shared_and_prepared_once(cluster, tmp_path):
 def test_a_task_that_kills_workers_is_named(cluster, tmp_path):
     with pytest.raises(JobError, match=r"5\.txt: workers die over it"):
         run(some(tmp_path, {5: "kills"}, count=8), executor=connect(cluster.scheduler_address), chunk=2)
-    assert "5.txt" not in texts(tmp_path)
+    assert "5.txt" not in finished(tmp_path)
     assert begun(tmp_path).count(5) >= 4
     # the cluster recovers by itself
     for task in some(tmp_path, count=8):
@@ -181,5 +181,5 @@ def test_a_scheduler_that_dies_in_mid_run(lonely, tmp_path):
     finally:
         worker.kill()
         worker.wait()
-    assert 0 < len(texts(tmp_path)) < 40
+    assert 0 < len(finished(tmp_path)) < 40
     assert run(tasks, workers=1).kept >= 1

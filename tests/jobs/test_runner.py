@@ -13,7 +13,7 @@ from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
-from tasks import begun, some, texts
+from tasks import begun, finished, some, texts
 
 from facegen.errors import FileError, InputError, JobError
 from facegen.jobs import runner
@@ -105,7 +105,7 @@ def test_a_failure_ends_the_run_and_names_the_file(tmp_path, workers):
     with pytest.raises(ValueError, match="no such luck") as caught:
         run(some(tmp_path, {3: "fails"}, count=60, kind="slow"), workers=workers, chunk=2)
     assert f"while making {tmp_path / '3.txt'}" in caught.value.__notes__
-    assert len(texts(tmp_path)) < 20
+    assert len(finished(tmp_path)) < 20
     if workers == 2:
         assert any("in the worker:" in note and "tasks.py" in note for note in caught.value.__notes__)
 
@@ -198,7 +198,7 @@ def start(folder: Path) -> subprocess.Popen:
     process = subprocess.Popen([sys.executable, "-u", str(script)], stderr=subprocess.PIPE, text=True,
                                preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL))
     deadline = time.monotonic() + 30
-    while len(texts(folder)) < 4:
+    while len(finished(folder)) < 4:
         assert time.monotonic() < deadline
         time.sleep(0.02)
     return process
@@ -208,9 +208,9 @@ def gone(folder: Path, seconds: float = 8.0) -> bool:
     """Whether no worker goes on writing."""
     deadline = time.monotonic() + seconds
     while time.monotonic() < deadline:
-        before = len(texts(folder))
+        before = finished(folder)
         time.sleep(0.5)
-        if len(texts(folder)) == before:
+        if finished(folder) == before:
             return True
     return False
 

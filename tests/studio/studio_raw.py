@@ -51,11 +51,12 @@ class RawPage:
     def send(self, *messages: Mapping[str, Any]) -> None:
         """Send messages as viser's page does, one each."""
         for message in messages:
-            self.socket.send(msgspec.msgpack.encode(dict(message)))
+            self.send_bytes(msgspec.msgpack.encode(dict(message)))
 
     def send_bytes(self, data: bytes) -> None:
-        """Send anything."""
-        self.socket.send(data)
+        """Send anything; as in a browser, nothing is said when the server has closed: what is received tells."""
+        with contextlib.suppress(ConnectionClosed):
+            self.socket.send(data)
 
     def receive(self, seconds: float = PATIENCE) -> list[dict[str, Any]]:
         """Return the next batch of messages from the server, an empty list when none comes."""
