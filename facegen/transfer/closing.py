@@ -233,7 +233,7 @@ def closing(skin: Skin, slit: Slit, eye: EyeFront | None = None) -> Closing | No
 
     eye: what lies behind lids, if anything does.
     """
-    found = facing_margins(skin, slit)
+    found = skin.lips if slit is LIPS else facing_margins(skin, slit)
     if found is None:
         return None
     own, margins = found

@@ -119,9 +119,11 @@ class Behind:
 class Lining:
     """What lay behind the lips at rest, thin and close behind them: it gives way by itself."""
 
-    def __init__(self, front: Front, pieces: PieceMotion) -> None:
+    def __init__(self, front: Front, pieces: PieceMotion, *, lined: bool = False) -> None:
+        """lined: whether all that the skin has there is behind the lips without this."""
         self._front, self._barrier = front, None
-        own = np.setdiff1d(np.unique(np.concatenate([front.near, pieces.rows("mouth")])), front.faces)
+        rows = pieces.rows("mouth")
+        own = np.setdiff1d(rows if lined else np.concatenate([front.near, rows]), front.faces)
         gap = front.ahead_of(own)
         behind = (gap > _ALLOWED * front.height) & (gap < _NEAR_LIPS * front.height)
         if behind.any():

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,7 +21,9 @@ from facegen.geometry.fade import smooth_step
 from facegen.geometry.operators import Surface
 from facegen.geometry.spline import smooth_curve
 from facegen.transfer.sides import SLITS, painted
-from facegen.transfer.skin import Skin
+
+if TYPE_CHECKING:
+    from facegen.transfer.skin import Skin
 
 Array = NDArray[np.float64]
 Places = Mapping[str, tuple[NDArray, NDArray]]

@@ -38,6 +38,8 @@ MEMBERS = {
               "mouth_upper_L", "mouth_upper_R", "mouth_lower_L", "mouth_lower_R"),
 }
 """The landmarks L_k of the six parts."""
+LIP_HEIGHTS = (("mouth_inner_top", "mouth_top"), ("mouth_inner_bottom", "mouth_bottom"))
+"""The edge of either lip, and its border with the skin."""
 
 # Because a size ratio beyond this is a mistaken landmark or a caricature, and the motion would tear the mesh.
 _LEAST, _MOST = 0.25, 4.0

@@ -7,7 +7,7 @@ finer copy where needed, correspondence, part motion (eq. 16-18), the jaw, and t
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, partial
 
 import numpy as np
@@ -21,7 +21,9 @@ from facegen.geometry.operators import Surface
 from facegen.progress import Progress, silent
 from facegen.transfer.baselines import PAPER, SUMNER, PaperWeights, expression_cloning, gradient_transfer
 from facegen.transfer.jaw import JawMotion, avatar_jaw, jaw_share
-from facegen.transfer.part_motion import MEMBERS, PartMotion, part_motion, spread
+from facegen.transfer.lining import depths, too_deep
+from facegen.transfer.margins import LIPS, Margins, facing_margins
+from facegen.transfer.part_motion import LIP_HEIGHTS, MEMBERS, PartMotion, part_motion, spread
 from facegen.transfer.refine import BEND, refine
 from facegen.transfer.registration import Correspondence, register
 from facegen.transfer.registration_key import registration_key
@@ -75,8 +77,32 @@ class Skin:
     @cached_property
     def feet(self) -> Feet:
         """The template's partner of each vertex."""
-        return self.correspondence(self.registered, vertex_normals(self.registered, self.surface.faces), self.sides,
-                                   reach=_REACH)
+        found = self.correspondence(self.registered, vertex_normals(self.registered, self.surface.faces), self.sides,
+                                    reach=_REACH)
+        return self._without_deep(found, self.depth)
+
+    @cached_property
+    def lips(self) -> tuple[Margins, Margins] | None:
+        """The edges of the template's lips and of the skin's, where both have some."""
+        return facing_margins(self, LIPS)
+
+    @cached_property
+    def depth(self) -> NDArray[np.float64]:
+        """How far (n,) behind the edges of the lips each vertex lies, mm along the skin; 0 for what does not."""
+        return np.zeros(len(self.surface.vertices)) if self.lips is None else \
+            depths(self.surface, self.lips[1], self.places)
+
+    @cached_property
+    def _template_depth(self) -> NDArray[np.float64]:
+        template = self.template
+        return np.zeros(len(template.surface.vertices)) if self.lips is None else \
+            depths(template.surface, self.lips[0], template.places)
+
+    def _without_deep(self, feet: Feet, depth: NDArray) -> Feet:
+        """Return the feet without those of a mouth's lining that lies deeper (n,) than the template's lips reach."""
+        partner = np.einsum("nc,nc->n", feet.weights, self._template_depth[self.template.surface.faces[feet.faces]])
+        scale = float(self.parts.ratios["mouth"].max())
+        return replace(feet, faces=np.where(feet.found & too_deep(depth, partner, scale), -1, feet.faces))
 
     @cached_property
     def copied(self) -> bool:
@@ -154,8 +180,23 @@ class Skin:
                                  np.array([self.template.landmarks[name] for name in names]))
         else:
             matrices = np.array([self.parts.matrices[part[name]] for name in names])
+        moved = landmark_matrix(self.template.places, names, matrices, len(self.template.surface.vertices))
         return (placing(self.places, names, len(self.surface.vertices)),
-                landmark_matrix(self.template.places, names, matrices, len(self.template.surface.vertices)))
+                self._thin_lips(names) @ moved if blended else moved)
+
+    def _thin_lips(self, names: tuple[str, ...]) -> sparse.csr_array:
+        """Return the matrix (3 l, 3 l) by which the edge of a lip moves beside its border by as much less than the
+        template's as the lip is lower: it would else roll over the border."""
+        matrix = np.eye(len(names))
+        height = self.parts.ratios["mouth"][1]
+        for edge, border in LIP_HEIGHTS:
+            if edge in names and border in names:
+                own, its = (np.linalg.norm(places[edge] - places[border])
+                            for places in (self.landmarks, self.template.landmarks))
+                i, j = names.index(edge), names.index(border)
+                matrix[i, i] = min(1.0, own / max(height * its, 1e-9))
+                matrix[i, j] = 1.0 - matrix[i, i]
+        return sparse.csr_array(sparse.kron(matrix, np.eye(3)))
 
     def solver(self, system: Transfer) -> Solver:
         """Return what solves a `system` for the template's shapes."""
@@ -164,17 +205,19 @@ class Skin:
     def system(self, weights: Weights = OURS) -> Transfer:
         """Return the system, on a finer copy of the skin where the template bends more than it can."""
         template, surface, registered = self.template, self.surface, self.registered
-        sides, feet = self.sides, self.feet
+        sides, depth, feet = self.sides, self.depth, self.feet
         places, matrix = self._landmark_motion(blended=True)
         if len(surface.faces) < _FINE_ENOUGH:
             fine, fine_registered, made_of = refine(surface, registered, partial(self._bend, self.without_jaw))
             if len(fine.vertices) > len(surface.vertices):
-                surface, registered, sides = fine, fine_registered, made_of @ sides
-                feet = self.correspondence(registered, vertex_normals(registered, surface.faces), sides, reach=_REACH)
+                surface, registered, sides, depth = fine, fine_registered, made_of @ sides, made_of @ depth
+                feet = self._without_deep(self.correspondence(
+                    registered, vertex_normals(registered, surface.faces), sides, reach=_REACH), depth)
                 places.resize((places.shape[0], len(surface.vertices)))
         shape = Surface(registered, surface.faces)
         middles = self.correspondence(shape.corners.mean(axis=1), shape.normals, sides[surface.faces].mean(axis=1),
                                       reach=_REACH)
+        middles = self._without_deep(middles, depth[surface.faces].mean(axis=1))
         matrices, turns = spread(self.parts, template.landmarks, registered)
         return Transfer(surface, template.surface, feet, middles, matrices, turns, places, matrix, weights, sides)
 

@@ -13,6 +13,7 @@ from facegen.transfer.closing import closing
 from facegen.transfer.eyeball import EyeFront
 from facegen.transfer.halfway import halfway
 from facegen.transfer.keep_apart import Guard
+from facegen.transfer.lining import inner_side
 from facegen.transfer.margins import LIDS, LIPS, Slit
 from facegen.transfer.piece_motion import PieceMotion, RigidMotions
 from facegen.transfer.pushing import Contact
@@ -40,7 +41,8 @@ class WholeMotion:
         self._hanging = parts.skin
         self._pieces = pieces = PieceMotion(parts.solid, parts.vertices, parts.skin.wound(parts.faces), parts.points)
         self._same = SamePieces(skin.template.pieces, pieces.pieces, parts.vertices)
-        self._guard = Guard(pieces)
+        self._inner = None if skin.copied else inner_side(skin)
+        self._guard = Guard(pieces, lined=self._inner is not None)
         fronts = {f"eye_{s}": EyeFront(ball, parts.vertices[pieces.rows(f"eye_{s}")])
                   for s, ball in pieces.eyes.items()}
         found = {slit: closing(skin, slit, fronts.get(slit.name)) for slit in (*LIDS, LIPS)}
@@ -66,6 +68,8 @@ class WholeMotion:
         slits = [slit.of(shapes, lid_closure) for slit in mended]
         for slit in slits:
             slit.close(on_skin)
+        if self._inner is not None:
+            self._inner.carry(on_skin)
         own = skin.jaw(opening)
         turns = None if own is None else RigidMotions.of(lambda at: own.movement(at, jaw))
         tongue = None if template.tongue is None else replace(template.tongue, motion=template.tongue.motion[shapes])
