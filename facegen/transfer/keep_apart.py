@@ -32,15 +32,16 @@ def keep_apart(pieces: PieceMotion, motion: ArrayLike,
 class Guard:
     """Keeps the pieces of one avatar apart; what no shape changes is computed once."""
 
-    def __init__(self, pieces: PieceMotion, *, lined: bool = False) -> None:
-        """lined: whether the inner side of the lips goes with the outer one, see `InnerSide`, and needs no guard."""
+    def __init__(self, pieces: PieceMotion, inner: NDArray[np.int64] | None = None) -> None:
+        """inner: vertices of the skin behind the lips' edges that go with the outer side, see `InnerSide`: they need no
+        guard, and are none. Without, what hides what tells both sides apart."""
         self._vertices, self._spread = pieces.vertices, Spread(pieces.skin)
         self._lids = {s: Lids(pieces, s, ball) for s, ball in pieces.eyes.items()
                       if ball.slide is None}                                    # a disc has no inside
-        front = Front(pieces)
+        front = Front(pieces, inner)
         self._behind = {kind: Behind(front, pieces, kind) for kind in ("teeth_upper", "teeth_lower", "tongue")
                         if len(pieces.rows(kind))}
-        self._lining = Lining(front, pieces, lined=lined)
+        self._lining = Lining(front, pieces, lined=inner is not None)
 
     def __call__(self, motion: Array, gaze: ArrayLike | None = None, *,
                  allowed: Mapping[str, ArrayLike] | None = None) -> dict[str, Contact]:

@@ -34,7 +34,8 @@ _LEFT = 0.01
 class Front:
     """The skin before the teeth, as seen from the front at rest."""
 
-    def __init__(self, pieces: PieceMotion) -> None:
+    def __init__(self, pieces: PieceMotion, inner: NDArray[np.int64] | None = None) -> None:
+        """inner: vertices of the skin that are behind the lips, where that is known."""
         face = pieces.face
         self.rest, self.height, self.axes = pieces.vertices, face.height, face.mouth_axes
         corners = pieces.skin.corners @ self.axes.T
@@ -43,6 +44,8 @@ class Front:
         self.near = np.unique(pieces.skin.faces[near])
         forward = pieces.skin.normals @ self.axes[2]
         near &= forward * (np.sign(forward[near].sum()) or 1.0) > _FORWARD      # triangles may be wound inward
+        if inner is not None:
+            near &= ~np.isin(pieces.skin.faces, inner).any(axis=1)
         rows = np.flatnonzero(near)
         # What was hidden at rest, such as the back of the mouth, is no barrier.
         seen = ahead(middles[rows], corners[rows])[0] < _SEEN * face.height

@@ -42,7 +42,7 @@ class WholeMotion:
         self._pieces = pieces = PieceMotion(parts.solid, parts.vertices, parts.skin.wound(parts.faces), parts.points)
         self._same = SamePieces(skin.template.pieces, pieces.pieces, parts.vertices)
         self._inner = None if skin.copied else inner_side(skin)
-        self._guard = Guard(pieces, lined=self._inner is not None)
+        self._guard = Guard(pieces, None if self._inner is None else self._rows[skin.depth > 0])
         fronts = {f"eye_{s}": EyeFront(ball, parts.vertices[pieces.rows(f"eye_{s}")])
                   for s, ball in pieces.eyes.items()}
         found = {slit: closing(skin, slit, fronts.get(slit.name)) for slit in (*LIDS, LIPS)}

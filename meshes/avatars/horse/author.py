@@ -162,7 +162,7 @@ def landmarks(clay: Clay) -> dict[str, NDArray]:
     """Return name -> place (3,) on the left half."""
     lids = lid_rings(model.EYE, clay, OPENING, **LID_RINGS)[-4]
     rows = lips(clay)
-    edge = rows[EDGE]
+    border, edge = rows[0], rows[EDGE]
     m = LIP
     on = lambda *place: clay.onto(np.array([place]))[0]  # noqa: E731
     return {
@@ -175,12 +175,12 @@ def landmarks(clay: Clay) -> dict[str, NDArray]:
         "nose_wing_L": on(1.4, -0.1, 10.3),
         "nose_base": on(0.0, 0.0, 11.3),
         "mouth_corner_L": edge[m],
-        "mouth_top": on(0.0, -0.4, 11.3),
+        "mouth_top": border[0],
         "mouth_inner_top": edge[0],
         "mouth_inner_bottom": edge[-1],
-        "mouth_bottom": rows[0][-1],
-        "mouth_upper_L": edge[m // 2],
-        "mouth_lower_L": edge[2 * m - m // 2],
+        "mouth_bottom": border[-1],
+        "mouth_upper_L": border[m // 2],
+        "mouth_lower_L": border[2 * m - m // 2],
         "chin": on(0.0, -2.5, 9.6),
         "jaw_L": on(1.9, -0.3, 1.5),
         "jaw_angle_L": on(1.4, -3.2, 1.6),
