@@ -6,9 +6,9 @@ finer copy where needed, correspondence, part motion (eq. 16-18), the jaw, and t
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from functools import cached_property, partial
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,7 +26,7 @@ from facegen.transfer.refine import BEND, refine
 from facegen.transfer.registration import Correspondence, register
 from facegen.transfer.registration_key import registration_key
 from facegen.transfer.sides import painted, settled, side_fields
-from facegen.transfer.solve import OURS, Transfer, Weights, landmark_matrix
+from facegen.transfer.solve import OURS, Followers, Transfer, Weights, landmark_motion
 from facegen.transfer.template import Template, placing
 
 METHODS = ("landmarks", "sumner", "cloning")
@@ -119,11 +119,9 @@ class Skin:
         if method == "cloning":
             return expression_cloning(self.surface, self.registered, template.surface, self.feet, template.motion)
         chosen = SUMNER if method == "sumner" else weights or PAPER
-        places, matrix = self._landmark_motion()
-        k = len(template.motion)
-        moved = (matrix @ template.motion.reshape(k, -1).T).T.reshape(k, -1, 3)
+        places, followers = self._landmark_motion()
         return gradient_transfer(self.surface, self.registered, template.surface, template.motion, weights=chosen,
-                                 landmarks=places, landmark_motion=moved, root=method == "sumner")
+                                 landmarks=places, landmark_motion=followers(template.motion), root=method == "sumner")
 
     def open_jaw(self, motion: NDArray, jaw: NDArray, opening: float = 1.0) -> None:
         """Add to displacements (k, n, 3) what the template's jaw (k, 3) does, in place."""
@@ -140,8 +138,8 @@ class Skin:
         turned = template.hinge.movement(template.surface.vertices, template.jaw)
         return template.motion - template.jaw_share[None, :, None] * turned
 
-    def _landmark_motion(self, *, blended: bool = False):
-        """Return the weights (l, n) that place the parts' landmarks, and the matrix that moves them (eq. 16).
+    def _landmark_motion(self, *, blended: bool = False) -> tuple[sparse.csr_array, Followers]:
+        """Return the weights (l, n) that place the parts' landmarks, and how these move (eq. 16).
 
         blended: as the skin round them goes, where parts blend; a muzzle's lip, which is turned against its nose, would
         else be drawn into a point. Else each by its own part, as in the paper.
@@ -155,7 +153,7 @@ class Skin:
         else:
             matrices = np.array([self.parts.matrices[part[name]] for name in names])
         return (placing(self.places, names, len(self.surface.vertices)),
-                landmark_matrix(self.template.places, names, matrices, len(self.template.surface.vertices)))
+                landmark_motion(self.template.places, names, matrices))
 
     def solver(self, system: Transfer) -> Solver:
         """Return what solves a `system` for the template's shapes."""
@@ -165,9 +163,9 @@ class Skin:
         """Return the system, on a finer copy of the skin where the template bends more than it can."""
         template, surface, registered = self.template, self.surface, self.registered
         sides, feet = self.sides, self.feet
-        places, matrix = self._landmark_motion(blended=True)
+        places, followers = self._landmark_motion(blended=True)
         if len(surface.faces) < _FINE_ENOUGH:
-            fine, fine_registered, made_of = refine(surface, registered, partial(self._bend, self.without_jaw))
+            fine, fine_registered, made_of = refine(surface, registered, self._bending(self.without_jaw))
             if len(fine.vertices) > len(surface.vertices):
                 surface, registered, sides = fine, fine_registered, made_of @ sides
                 feet = self.correspondence(registered, vertex_normals(registered, surface.faces), sides, reach=_REACH)
@@ -176,25 +174,30 @@ class Skin:
         middles = self.correspondence(shape.corners.mean(axis=1), shape.normals, sides[surface.faces].mean(axis=1),
                                       reach=_REACH)
         matrices, turns = spread(self.parts, template.landmarks, registered)
-        return Transfer(surface, template.surface, feet, middles, matrices, turns, places, matrix, weights, sides)
+        return Transfer(surface, template.surface, feet, middles, matrices, turns, places, followers, weights, sides)
 
-    def _bend(self, motion: NDArray, places: NDArray, sides: NDArray) -> NDArray[np.float64]:
-        """Return how far the motion of the middles of sides (e, 2) between places is from the mean of their ends', at
-        most, mm."""
-        ends, local = np.unique(sides, return_inverse=True)
-        a, b = local.reshape(-1, 2).T
-        at_ends, at_middles = (self._weights(at) for at in (places[ends], places[sides].mean(axis=1)))
-        difference = sparse.csr_array(at_middles - (at_ends[a] + at_ends[b]) * 0.5)
+    def _bending(self, motion: NDArray) -> Callable[[NDArray, NDArray], NDArray]:
+        """Return what gives for sides (e, 2) between places how far the motion of their middles is from the mean of
+        their ends', at most, mm."""
         n = len(self.template.surface.vertices)
-        reach = np.sqrt((motion**2).sum(axis=2)).max(axis=0)            # no side bends more than this allows
-        most = abs(difference) @ reach
-        mobile = np.flatnonzero(most > BEND)
-        most[mobile] = 0.0
-        for some in _blocks(len(motion) if len(mobile) else 0):
-            moved = difference[mobile] @ np.moveaxis(motion[some], 0, 1).reshape(n, -1)
-            length = np.sqrt((moved.reshape(len(mobile), -1, 3) ** 2).sum(axis=2))
-            most[mobile] = np.maximum(most[mobile], length.max(axis=1))
-        return most
+        farthest = np.sqrt(np.einsum("kni,kni->kn", motion, motion).max(axis=0))     # no side bends more than it allows
+
+        def bend(places: NDArray, sides: NDArray) -> NDArray[np.float64]:
+            ends, local = np.unique(sides, return_inverse=True)
+            a, b = local.reshape(-1, 2).T
+            at_ends, at_middles = (self._weights(at) for at in (places[ends], places[sides].mean(axis=1)))
+            difference = sparse.csr_array(at_middles - (at_ends[a] + at_ends[b]) * 0.5)
+            most = abs(difference) @ farthest
+            mobile = np.flatnonzero(most > BEND)
+            squared = np.zeros(len(mobile))
+            for some in _blocks(len(motion) if len(mobile) else 0):
+                moved = difference[mobile] @ np.moveaxis(motion[some], 0, 1).reshape(n, -1)
+                moved = moved.reshape(len(mobile), -1, 3)
+                squared = np.maximum(squared, np.einsum("eki,eki->ek", moved, moved).max(axis=1))
+            most[mobile] = np.sqrt(squared)
+            return most
+
+        return bend
 
     def _weights(self, places: NDArray) -> sparse.csr_array:
         """Return the weights (p, n_s) of the template's vertices at what is nearest to places (p, 3)."""

@@ -70,7 +70,7 @@ class Template:
 
 def places_on(surface: Surface, points: Mapping[str, NDArray]) -> dict[str, tuple[NDArray, NDArray]]:
     """Return for every point the vertices (3,) and weights (3,) of the nearest place on the surface."""
-    feet = ClosestPoints(surface)(np.array(list(points.values())))
+    feet = ClosestPoints(surface)(np.array(list(points.values())).reshape(-1, 3))
     return {name: (surface.faces[face], weights)
             for name, face, weights in zip(points, feet.faces, feet.weights, strict=True)}
 
@@ -129,7 +129,7 @@ def skin_places(face: Face, surface: Surface, detail: int) -> dict[str, tuple[ND
     """Return the landmarks on the skin: as they are defined, which tells lips that touch apart; those of other parts,
     the brows', at the nearest place. The pupils are none of the skin's."""
     mesh = face.mesh(detail)
-    result = {}
+    result, elsewhere = {}, {}
     weights = face.landmark_weights(detail)
     for row, name in enumerate(face.landmarks):
         if name.startswith("eye_center"):
@@ -140,5 +140,6 @@ def skin_places(face: Face, surface: Surface, detail: int) -> dict[str, tuple[ND
             fill = 3 - len(columns)
             result[name] = (np.pad(columns, (0, fill), mode="edge"), np.pad(shares, (0, fill)))
         else:
-            result |= places_on(surface, {name: shares @ mesh.vertices[columns]})
-    return result
+            elsewhere[name] = shares @ mesh.vertices[columns]
+    found = result | places_on(surface, elsewhere)
+    return {name: found[name] for name in face.landmarks if name in found}
