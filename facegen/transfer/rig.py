@@ -15,7 +15,6 @@ from facegen.errors import FileError, InputError, nearest
 from facegen.face.face import load_face
 from facegen.fileio.avatar import AvatarFile, check_output, load_avatar, save_avatar
 from facegen.fileio.kept import Kept, kept_in
-from facegen.forked import Aside
 from facegen.progress import Progress, silent, within
 from facegen.transfer.choices import Choices
 from facegen.transfer.halfway import half_name
@@ -113,13 +112,10 @@ class Rigging:
 
         avatar, landmarks: as in `rig`, or what `load_avatar` and `snap` gave. Everything else as in `rig`.
         """
-        self._asked = asked = _asked(sets, shapes, person, template, template_landmarks)
-        self._kept = kept = kept_in("registrations") if cache else None
-        with Aside(lambda: asked.make(kept), useful=not _last.made_of(asked.of)) as making:
-            self.source, self.places, odd = _read(avatar, landmarks)
-            if making.forked:
-                _last.template(asked.of, making.result)
-        self.warnings = (*odd, *_without_expressions(self.source, asked.sets))
+        self._asked = _asked(sets, shapes, person, template, template_landmarks)
+        self._kept = kept_in("registrations") if cache else None
+        self.source, self.places, odd = _read(avatar, landmarks)
+        self.warnings = (*odd, *_without_expressions(self.source, self._asked.sets))
         self._pieces = pieces
         self._binding: Binding | None = None
         self._once = False
@@ -240,9 +236,6 @@ class _Last:
 
     def __init__(self) -> None:
         self._kept: tuple[Hashable, Template] | None = None
-
-    def made_of(self, of: Hashable) -> bool:
-        return self._kept is not None and self._kept[0] == of
 
     def template(self, of: Hashable, make: Callable[[], Template]) -> Template:
         """Return it if it was made of this; else make it, and keep it instead."""

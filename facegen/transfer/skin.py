@@ -109,7 +109,7 @@ class Skin:
         """Return the displacements (k, n, 3) of the template's shapes on this skin, mm."""
         if method == "landmarks" and not isinstance(weights, PaperWeights):
             result = self.solver(self.system(weights or OURS))(np.arange(len(self.template.names)), progress=progress)
-            self.open_jaw(result, self.template.jaw)
+            self.open_jaw(result, self.template.shapes.jaw)
             return result
         return self.published_motion(method, weights)
 
@@ -135,7 +135,7 @@ class Skin:
         template = self.template
         if template.hinge is None:
             return template.motion
-        turned = template.hinge.movement(template.surface.vertices, template.jaw)
+        turned = template.hinge.movement(template.surface.vertices, template.shapes.jaw)
         return template.motion - template.jaw_share[None, :, None] * turned
 
     def _landmark_motion(self, *, blended: bool = False) -> tuple[sparse.csr_array, Followers]:
