@@ -15,9 +15,11 @@ from facegen.errors import FileError, InputError, nearest
 from facegen.face.face import load_face
 from facegen.fileio.avatar import AvatarFile, check_output, load_avatar, save_avatar
 from facegen.fileio.kept import Kept, kept_in
+from facegen.forked import Aside
 from facegen.progress import Progress, silent, within
 from facegen.transfer.choices import Choices
 from facegen.transfer.halfway import half_name
+from facegen.transfer.landmark_checks import average_face
 from facegen.transfer.landmarks import Landmarks, check_places, load_checked
 from facegen.transfer.pieces import describe
 from facegen.transfer.template import Template, template_of
@@ -114,7 +116,11 @@ class Rigging:
         """
         self._asked = _asked(sets, shapes, person, template, template_landmarks)
         self._kept = kept_in("registrations") if cache else None
-        self.source, self.places, odd = _read(avatar, landmarks)
+        average_face()          # which both need: landmarks are compared with it, and the template is made of it
+        with Aside(lambda: _read(avatar, landmarks), useful=not _last.made_of(self._asked.of)) as reading:
+            if reading.forked:
+                self._template()
+            self.source, self.places, odd = reading.result()
         self.warnings = (*odd, *_without_expressions(self.source, self._asked.sets))
         self._pieces = pieces
         self._binding: Binding | None = None
@@ -158,11 +164,13 @@ class Rigging:
                                  f"{nearest(str(name), self.names)}")
         if self._binding is None:
             progress("making the shapes of the template", 0.0)
-            template = _last.template(self._asked.of, lambda: self._asked.make(self._kept))
-            self._binding = Binding(self.source.mesh, self.places, template, pieces=self._pieces, kept=self._kept,
-                                    progress=within(progress, 0.1, 0.4))
+            self._binding = Binding(self.source.mesh, self.places, self._template(), pieces=self._pieces,
+                                    kept=self._kept, progress=within(progress, 0.1, 0.4))
             progress = within(progress, 0.4, 1.0)
         return self._binding.shapes(choices, self.names if only is None else only, progress=progress)
+
+    def _template(self) -> Template:
+        return _last.template(self._asked.of, lambda: self._asked.make(self._kept))
 
 
 def rig(avatar: str | Path, output: str | Path, *, landmarks: str | Path | None = None,
@@ -236,6 +244,9 @@ class _Last:
 
     def __init__(self) -> None:
         self._kept: tuple[Hashable, Template] | None = None
+
+    def made_of(self, of: Hashable) -> bool:
+        return self._kept is not None and self._kept[0] == of
 
     def template(self, of: Hashable, make: Callable[[], Template]) -> Template:
         """Return it if it was made of this; else make it, and keep it instead."""
