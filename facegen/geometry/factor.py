@@ -32,20 +32,25 @@ class Factor:
 
     def __init__(self, matrix: sparse.sparray, *, what: str = "the system", spent: Factor | None = None) -> None:
         matrix = sparse.csc_array(matrix)
+        matrix.sum_duplicates()
         diagonal = matrix.diagonal()
         if not np.isfinite(matrix.data).all() or not len(diagonal) or diagonal.min() <= 0:
             raise InputError(f"{what} cannot be solved: a vertex is tied to nothing, or a number is not finite")
         # Scaled to a unit diagonal: pivots of different places can then be compared.
         self._scale = 1 / np.sqrt(diagonal)
-        scaled = sparse.csc_array(matrix * self._scale[:, None] * self._scale[None, :])
+        columns = np.repeat(np.arange(len(diagonal)), np.diff(matrix.indptr))
+        scaled = matrix.data * self._scale[matrix.indices] * self._scale[columns]
         library = _qdldl()
         try:
             if library is None:
-                self._factor = sparse.linalg.splu(scaled, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0,
+                matrix = sparse.csc_array((scaled, matrix.indices, matrix.indptr), shape=matrix.shape)
+                self._factor = sparse.linalg.splu(matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0,
                                                   options={"SymmetricMode": True})
                 pivots = np.abs(self._factor.U.diagonal())
             else:
-                self._upper = sparse.csc_matrix(sparse.triu(scaled, format="csc"))
+                upper = matrix.indices <= columns
+                starts = np.concatenate([[0], np.cumsum(np.bincount(columns[upper], minlength=len(diagonal)))])
+                self._upper = sparse.csc_matrix((scaled[upper], matrix.indices[upper], starts), shape=matrix.shape)
                 if spent is not None and spent._has_places_of(self._upper):
                     self._factor = spent._factor
                     self._factor.update(self._upper, upper=True)

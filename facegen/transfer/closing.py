@@ -252,9 +252,9 @@ def closing(skin: Skin, slit: Slit, eye: EyeFront | None = None) -> Closing | No
 def _jaw_alone(template: Template, own: Margins) -> Array:
     """Return how the template's jaw alone would change the gap between its lips (k, SAMPLES, 3), mm."""
     if template.hinge is None:
-        return np.zeros((len(template.jaw), SAMPLES, 3))
+        return np.zeros((len(template.shapes.jaw), SAMPLES, 3))
     used = np.unique(np.concatenate([own.upper.indices, own.lower.indices]))
-    turned = template.hinge.movement(template.surface.vertices[used], template.jaw)
+    turned = template.hinge.movement(template.surface.vertices[used], template.shapes.jaw)
     across = (own.upper - own.lower).tocsc()[:, used].toarray()
     return across @ (template.jaw_share[used, None] * turned)
 

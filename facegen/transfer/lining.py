@@ -8,7 +8,7 @@ inner side of the template's lips; what is farther inside has no partner there.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -21,6 +21,7 @@ from facegen.geometry.closest import ClosestPoints
 from facegen.geometry.fade import smooth_step
 from facegen.geometry.normals import vertex_normals
 from facegen.geometry.operators import Surface
+from facegen.transfer.solve import Followers
 
 if TYPE_CHECKING:
     from facegen.transfer.margins import Margins
@@ -72,6 +73,35 @@ def too_deep(depth: Array, partner: Array, scale: float) -> NDArray[np.bool_]:
     """Return which vertices (n,) lie farther behind the lips than their partners (n,) do, mm. scale: how many times as
     large as the template's the mouth is."""
     return depth > _DEEPER * scale * partner + _DEEPER_MM
+
+
+@dataclass(frozen=True, eq=False)
+class Leaning(Followers):
+    """Places of which some lean on others: ``lean`` (p, p) says how much of each one's movement each takes."""
+
+    lean: Array
+
+    def __call__(self, motion: Array) -> Array:
+        """Return the places' displacements (k, p, 3) for the template's (k, n_s, 3)."""
+        return np.einsum("pq,kqi->kpi", self.lean, super().__call__(motion))
+
+    def blocks(self, shares: sparse.sparray):
+        """As theirs, for shares (n, p)."""
+        return super().blocks(sparse.csr_array(shares) @ sparse.csr_array(self.lean))
+
+
+def leaning(followers: Followers, names: Sequence[str], thinness: Mapping[str, tuple[str, float]]) -> Leaning:
+    """Return the landmarks (p,) with the edges of lips leaning on their borders: the lower a lip is beside the
+    template's, the less its edge moves beside its border, over which it would else roll.
+
+    thinness: edge -> border, and 0 for a lip as high as the template's, to 1.
+    """
+    lean = np.eye(len(names))
+    for edge, (border, share) in thinness.items():
+        if edge in names and border in names:
+            i, j = names.index(edge), names.index(border)
+            lean[i, i], lean[i, j] = 1.0 - share, share
+    return Leaning(followers.corners, followers.weights, followers.matrices, lean)
 
 
 @dataclass(frozen=True, eq=False)

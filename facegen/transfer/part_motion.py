@@ -49,6 +49,8 @@ _MOUTH_LEAST, _MOUTH_MOST = 0.7, 1.4
 _REACH = 0.6
 # The say of "no part": where all parts are farther than about 1.5 reaches, motion is neither turned nor scaled.
 _ELSEWHERE = 0.1
+# Means of rotations need about five rounds; what is left then is less than this.
+_MOST_ROUNDS, _ROUNDING = 20, 1e-14
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,6 +126,17 @@ def spread(motion: PartMotion, landmarks: Mapping[str, NDArray], at: NDArray) ->
 
 
 def nearest_rotations(matrices: NDArray) -> NDArray[np.float64]:
-    """Return the rotations (n, 3, 3) nearest to means of rotations that differ by less than a right angle."""
+    """Return the rotations (n, 3, 3) nearest to means of rotations that differ by less than a right angle.
+
+    By Newton's iteration (Higham 1986): a third of the time of singular values, which serve where it does not end.
+    """
+    rows = np.ascontiguousarray(np.moveaxis(matrices, 0, 2))            # (3, 3, n): NumPy is slow along short last axes
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        for _ in range(_MOST_ROUNDS):
+            cofactors = np.stack([np.cross(rows[k - 2], rows[k - 1], axis=0) for k in range(3)])
+            step = cofactors / (rows[0] * cofactors[0]).sum(axis=0) - rows
+            rows += step / 2
+            if np.abs(step).max(initial=0.0) < _ROUNDING:
+                return np.ascontiguousarray(np.moveaxis(rows, 2, 0))
     u, _, vt = np.linalg.svd(matrices)
     return u @ vt

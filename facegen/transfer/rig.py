@@ -19,6 +19,7 @@ from facegen.forked import Aside
 from facegen.progress import Progress, silent, within
 from facegen.transfer.choices import Choices
 from facegen.transfer.halfway import half_name
+from facegen.transfer.landmark_checks import average_face
 from facegen.transfer.landmarks import Landmarks, check_places, load_checked
 from facegen.transfer.pieces import describe
 from facegen.transfer.template import Template, template_of
@@ -113,13 +114,14 @@ class Rigging:
 
         avatar, landmarks: as in `rig`, or what `load_avatar` and `snap` gave. Everything else as in `rig`.
         """
-        self._asked = asked = _asked(sets, shapes, person, template, template_landmarks)
-        self._kept = kept = kept_in("registrations") if cache else None
-        with Aside(lambda: asked.make(kept), useful=not _last.made_of(asked.of)) as making:
-            self.source, self.places, odd = _read(avatar, landmarks)
-            if making.forked:
-                _last.template(asked.of, making.result)
-        self.warnings = (*odd, *_without_expressions(self.source, asked.sets))
+        self._asked = _asked(sets, shapes, person, template, template_landmarks)
+        self._kept = kept_in("registrations") if cache else None
+        average_face()          # which both need: landmarks are compared with it, and the template is made of it
+        with Aside(lambda: _read(avatar, landmarks), useful=not _last.made_of(self._asked.of)) as reading:
+            if reading.forked:
+                self._template()
+            self.source, self.places, odd = reading.result()
+        self.warnings = (*odd, *_without_expressions(self.source, self._asked.sets))
         self._pieces = pieces
         self._binding: Binding | None = None
         self._once = False
@@ -162,11 +164,13 @@ class Rigging:
                                  f"{nearest(str(name), self.names)}")
         if self._binding is None:
             progress("making the shapes of the template", 0.0)
-            template = _last.template(self._asked.of, lambda: self._asked.make(self._kept))
-            self._binding = Binding(self.source.mesh, self.places, template, pieces=self._pieces, kept=self._kept,
-                                    progress=within(progress, 0.1, 0.4))
+            self._binding = Binding(self.source.mesh, self.places, self._template(), pieces=self._pieces,
+                                    kept=self._kept, progress=within(progress, 0.1, 0.4))
             progress = within(progress, 0.4, 1.0)
         return self._binding.shapes(choices, self.names if only is None else only, progress=progress)
+
+    def _template(self) -> Template:
+        return _last.template(self._asked.of, lambda: self._asked.make(self._kept))
 
 
 def rig(avatar: str | Path, output: str | Path, *, landmarks: str | Path | None = None,

@@ -6,9 +6,9 @@ finer copy where needed, correspondence, part motion (eq. 16-18), the jaw, and t
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from functools import cached_property, partial
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,14 +21,14 @@ from facegen.geometry.operators import Surface
 from facegen.progress import Progress, silent
 from facegen.transfer.baselines import PAPER, SUMNER, PaperWeights, expression_cloning, gradient_transfer
 from facegen.transfer.jaw import JawMotion, avatar_jaw, jaw_share
-from facegen.transfer.lining import depths, too_deep
+from facegen.transfer.lining import depths, leaning, too_deep
 from facegen.transfer.margins import LIPS, Margins, facing_margins
 from facegen.transfer.part_motion import LIP_HEIGHTS, MEMBERS, PartMotion, part_motion, spread
 from facegen.transfer.refine import BEND, refine
 from facegen.transfer.registration import Correspondence, register
 from facegen.transfer.registration_key import registration_key
 from facegen.transfer.sides import painted, settled, side_fields
-from facegen.transfer.solve import OURS, Transfer, Weights, landmark_matrix
+from facegen.transfer.solve import OURS, Followers, Transfer, Weights, landmark_motion
 from facegen.transfer.template import Template, placing
 
 METHODS = ("landmarks", "sumner", "cloning")
@@ -135,7 +135,7 @@ class Skin:
         """Return the displacements (k, n, 3) of the template's shapes on this skin, mm."""
         if method == "landmarks" and not isinstance(weights, PaperWeights):
             result = self.solver(self.system(weights or OURS))(np.arange(len(self.template.names)), progress=progress)
-            self.open_jaw(result, self.template.jaw)
+            self.open_jaw(result, self.template.shapes.jaw)
             return result
         return self.published_motion(method, weights)
 
@@ -145,11 +145,9 @@ class Skin:
         if method == "cloning":
             return expression_cloning(self.surface, self.registered, template.surface, self.feet, template.motion)
         chosen = SUMNER if method == "sumner" else weights or PAPER
-        places, matrix = self._landmark_motion()
-        k = len(template.motion)
-        moved = (matrix @ template.motion.reshape(k, -1).T).T.reshape(k, -1, 3)
+        places, followers = self._landmark_motion()
         return gradient_transfer(self.surface, self.registered, template.surface, template.motion, weights=chosen,
-                                 landmarks=places, landmark_motion=moved, root=method == "sumner")
+                                 landmarks=places, landmark_motion=followers(template.motion), root=method == "sumner")
 
     def open_jaw(self, motion: NDArray, jaw: NDArray, opening: float = 1.0) -> None:
         """Add to displacements (k, n, 3) what the template's jaw (k, 3) does, in place."""
@@ -163,11 +161,11 @@ class Skin:
         template = self.template
         if template.hinge is None:
             return template.motion
-        turned = template.hinge.movement(template.surface.vertices, template.jaw)
+        turned = template.hinge.movement(template.surface.vertices, template.shapes.jaw)
         return template.motion - template.jaw_share[None, :, None] * turned
 
-    def _landmark_motion(self, *, blended: bool = False):
-        """Return the weights (l, n) that place the parts' landmarks, and the matrix that moves them (eq. 16).
+    def _landmark_motion(self, *, blended: bool = False) -> tuple[sparse.csr_array, Followers]:
+        """Return the weights (l, n) that place the parts' landmarks, and how these move (eq. 16).
 
         blended: as the skin round them goes, where parts blend; a muzzle's lip, which is turned against its nose, would
         else be drawn into a point. Else each by its own part, as in the paper.
@@ -180,23 +178,19 @@ class Skin:
                                  np.array([self.template.landmarks[name] for name in names]))
         else:
             matrices = np.array([self.parts.matrices[part[name]] for name in names])
-        moved = landmark_matrix(self.template.places, names, matrices, len(self.template.surface.vertices))
+        followers = landmark_motion(self.template.places, names, matrices)
         return (placing(self.places, names, len(self.surface.vertices)),
-                self._thin_lips(names) @ moved if blended else moved)
+                leaning(followers, names, self._thinness()) if blended else followers)
 
-    def _thin_lips(self, names: tuple[str, ...]) -> sparse.csr_array:
-        """Return the matrix (3 l, 3 l) by which the edge of a lip moves beside its border by as much less than the
-        template's as the lip is lower: it would else roll over the border."""
-        matrix = np.eye(len(names))
-        height = self.parts.ratios["mouth"][1]
+    def _thinness(self) -> dict[str, tuple[str, float]]:
+        """Return edge -> its border, and how much lower, 0 to 1, that lip is than the template's."""
+        height, result = self.parts.ratios["mouth"][1], {}
         for edge, border in LIP_HEIGHTS:
-            if edge in names and border in names:
-                own, its = (np.linalg.norm(places[edge] - places[border])
-                            for places in (self.landmarks, self.template.landmarks))
-                i, j = names.index(edge), names.index(border)
-                matrix[i, i] = min(1.0, own / max(height * its, 1e-9))
-                matrix[i, j] = 1.0 - matrix[i, i]
-        return sparse.csr_array(sparse.kron(matrix, np.eye(3)))
+            own, its = (np.linalg.norm(places[edge] - places[border]) if edge in places and border in places else 0.0
+                        for places in (self.landmarks, self.template.landmarks))
+            if its > 0:
+                result[edge] = border, max(0.0, 1.0 - own / max(height * its, 1e-9))
+        return result
 
     def solver(self, system: Transfer) -> Solver:
         """Return what solves a `system` for the template's shapes."""
@@ -206,9 +200,9 @@ class Skin:
         """Return the system, on a finer copy of the skin where the template bends more than it can."""
         template, surface, registered = self.template, self.surface, self.registered
         sides, depth, feet = self.sides, self.depth, self.feet
-        places, matrix = self._landmark_motion(blended=True)
+        places, followers = self._landmark_motion(blended=True)
         if len(surface.faces) < _FINE_ENOUGH:
-            fine, fine_registered, made_of = refine(surface, registered, partial(self._bend, self.without_jaw))
+            fine, fine_registered, made_of = refine(surface, registered, self._bending(self.without_jaw))
             if len(fine.vertices) > len(surface.vertices):
                 surface, registered, sides, depth = fine, fine_registered, made_of @ sides, made_of @ depth
                 feet = self._without_deep(self.correspondence(
@@ -219,25 +213,30 @@ class Skin:
                                       reach=_REACH)
         middles = self._without_deep(middles, depth[surface.faces].mean(axis=1))
         matrices, turns = spread(self.parts, template.landmarks, registered)
-        return Transfer(surface, template.surface, feet, middles, matrices, turns, places, matrix, weights, sides)
+        return Transfer(surface, template.surface, feet, middles, matrices, turns, places, followers, weights, sides)
 
-    def _bend(self, motion: NDArray, places: NDArray, sides: NDArray) -> NDArray[np.float64]:
-        """Return how far the motion of the middles of sides (e, 2) between places is from the mean of their ends', at
-        most, mm."""
-        ends, local = np.unique(sides, return_inverse=True)
-        a, b = local.reshape(-1, 2).T
-        at_ends, at_middles = (self._weights(at) for at in (places[ends], places[sides].mean(axis=1)))
-        difference = sparse.csr_array(at_middles - (at_ends[a] + at_ends[b]) * 0.5)
+    def _bending(self, motion: NDArray) -> Callable[[NDArray, NDArray], NDArray]:
+        """Return what gives for sides (e, 2) between places how far the motion of their middles is from the mean of
+        their ends', at most, mm."""
         n = len(self.template.surface.vertices)
-        reach = np.sqrt((motion**2).sum(axis=2)).max(axis=0)            # no side bends more than this allows
-        most = abs(difference) @ reach
-        mobile = np.flatnonzero(most > BEND)
-        most[mobile] = 0.0
-        for some in _blocks(len(motion) if len(mobile) else 0):
-            moved = difference[mobile] @ np.moveaxis(motion[some], 0, 1).reshape(n, -1)
-            length = np.sqrt((moved.reshape(len(mobile), -1, 3) ** 2).sum(axis=2))
-            most[mobile] = np.maximum(most[mobile], length.max(axis=1))
-        return most
+        farthest = np.sqrt(np.einsum("kni,kni->kn", motion, motion).max(axis=0))     # no side bends more than it allows
+
+        def bend(places: NDArray, sides: NDArray) -> NDArray[np.float64]:
+            ends, local = np.unique(sides, return_inverse=True)
+            a, b = local.reshape(-1, 2).T
+            at_ends, at_middles = (self._weights(at) for at in (places[ends], places[sides].mean(axis=1)))
+            difference = sparse.csr_array(at_middles - (at_ends[a] + at_ends[b]) * 0.5)
+            most = abs(difference) @ farthest
+            mobile = np.flatnonzero(most > BEND)
+            squared = np.zeros(len(mobile))
+            for some in _blocks(len(motion) if len(mobile) else 0):
+                moved = difference[mobile] @ np.moveaxis(motion[some], 0, 1).reshape(n, -1)
+                moved = moved.reshape(len(mobile), -1, 3)
+                squared = np.maximum(squared, np.einsum("eki,eki->ek", moved, moved).max(axis=1))
+            most[mobile] = np.sqrt(squared)
+            return most
+
+        return bend
 
     def _weights(self, places: NDArray) -> sparse.csr_array:
         """Return the weights (p, n_s) of the template's vertices at what is nearest to places (p, 3)."""

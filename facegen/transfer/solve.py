@@ -14,12 +14,12 @@ plane into the triangle's, so that derivatives are taken along corresponding dir
 equation): gradients alone leave shapes adrift. f fades where the partner is far.
 
 The left-hand side is the same for all shapes and all three axes: it is factored once. The right-hand side is linear in
-r: one sparse matrix makes those of all shapes.
+r: one sparse matrix of blocks (3, 3) makes those of all shapes.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -67,14 +67,46 @@ class Weights:
 OURS = Weights(gradients=1.0, landmarks=20.0, anchor=0.032)
 
 
+@dataclass(frozen=True)
+class Followers:
+    """How p places are moved by a template: each by the mean of three vertices' movement times a matrix. ``corners``
+    (p, 3), ``weights`` (p, 3), ``matrices`` (p, 3, 3)."""
+
+    corners: NDArray[np.int64]
+    weights: NDArray[np.float64]
+    matrices: NDArray[np.float64]
+
+    def __call__(self, motion: NDArray) -> NDArray[np.float64]:
+        """Return the places' displacements (k, p, 3) for the template's (k, n_s, 3)."""
+        followed = np.einsum("pc,kpcj->kpj", self.weights, motion[:, self.corners])
+        return np.einsum("pij,kpj->kpi", self.matrices, followed)
+
+    def blocks(self, shares: sparse.sparray) -> _Blocks:
+        """Return what vertices take of the places' displacements: shares (n, p)."""
+        shares = sparse.coo_array(shares)
+        v, p = shares.coords
+        weights = shares.data[:, None] * self.weights[p]
+        return _Blocks(np.repeat(v, 3), self.corners[p].ravel(),
+                       (weights[:, :, None, None] * self.matrices[p][:, None]).reshape(-1, 3, 3))
+
+
+@dataclass(frozen=True)
+class _Blocks:
+    """Matrices ``values`` (b, 3, 3) from the template's vertices ``columns`` (b,) to the avatar's ``rows`` (b,)."""
+
+    rows: NDArray[np.int64]
+    columns: NDArray[np.int64]
+    values: NDArray[np.float64]
+
+
 class Transfer:
     """The system from one template's skin to one avatar's: built once, ``solve`` for any shapes."""
 
     def __init__(self, surface: Surface, template: Surface, feet: Feet, triangle_feet: Feet, matrices: NDArray,
-                 turns: NDArray, landmarks: sparse.csr_array, landmark_motion: sparse.csr_array,
+                 turns: NDArray, landmarks: sparse.csr_array, landmark_motion: Followers,
                  weights: Weights = OURS, sides: NDArray | None = None) -> None:
         """surface, template: the skins. feet: of the avatar's vertices (n,), triangle_feet: of its triangles' middles
-        (m,). matrices (n, 3, 3): M; turns (n, 3, 3): R. landmarks (l, n); landmark_motion (3 l, 3 n_s): M r. sides
+        (m,). matrices (n, 3, 3): M; turns (n, 3, 3): R. landmarks (l, n); landmark_motion: M r. sides
         (n, s): `side_fields` of the surface, which keep a lip's lining with its own lip."""
         n, n_s = len(surface.vertices), len(template.vertices)
         trust = 1 / (1 + (np.where(feet.found, feet.distances, 0) / _FADE) ** 2)
@@ -93,47 +125,17 @@ class Transfer:
         least = _LEAST_ENERGY * energy.max()
         _check_tied(energy > least)
         self._matrix = matrix + sparse.diags_array(_TIE * energy + least)
-        right = weights.gradients * self._gradient_part(surface, template, triangle_feet, turns)
+        parts = [_gradient_blocks(surface, template, triangle_feet, turns, weights.gradients)]
         pulled = sparse.diags_array(anchor) @ (sparse.diags_array(feet.found.astype(float)) + lining)
-        right = right + sparse.kron(pulled, sparse.identity(3), format="csr") @ self._carried(template, feet, matrices)
+        parts.append(Followers(template.faces[feet.faces], feet.weights, matrices).blocks(pulled))
         if weights.landmarks:
-            spread = sparse.kron(landmarks.T, sparse.identity(3, format="csr"), format="csr")
-            right = right + weights.landmarks * (spread @ landmark_motion)
-        self._right = sparse.csr_array(right)
+            parts.append(landmark_motion.blocks(weights.landmarks * landmarks.T))
+        self._right = _assembled(parts, n, n_s)
         self._shape = (n, n_s)
 
     @cached_property
     def _factor(self) -> Factor:
         return Factor(self._matrix, what="the transfer to the avatar")
-
-    @staticmethod
-    def _gradient_part(surface: Surface, template: Surface, feet: Feet, turns: NDArray) -> sparse.csr_array:
-        """Return the matrix (3 n, 3 n_s) of G^T W R (grad r) Q^T."""
-        n, n_s = len(surface.vertices), len(template.vertices)
-        t = np.flatnonzero(feet.found)
-        s = feet.faces[t]
-        turn = nearest_rotations(turns[surface.faces[t]].mean(axis=1))
-        plane = rotation_between(np.einsum("tij,tj->ti", turn, template.normals[s]), surface.normals[t]) @ turn
-        # d(hat_i)/d(place) . Q . d(hat_j)/d(place): how corner i of t answers corner j of s
-        answer = np.einsum("tia,tab,tjb->tij", surface.hat_gradients[t], plane, template.hat_gradients[s])
-        answer *= surface.areas[t, None, None]
-        values = answer[:, :, None, :, None] * turn[:, None, :, None, :]                     # (t, i, c, j, d)
-        rows = 3 * surface.faces[t][:, :, None] + np.arange(3)
-        columns = 3 * template.faces[s][:, :, None] + np.arange(3)
-        rows = np.broadcast_to(rows[:, :, :, None, None], values.shape)
-        columns = np.broadcast_to(columns[:, None, None], values.shape)
-        return sparse.coo_array((values.ravel(), (rows.ravel(), columns.ravel())), shape=(3 * n, 3 * n_s)).tocsr()
-
-    @staticmethod
-    def _carried(template: Surface, feet: Feet, matrices: NDArray) -> sparse.csr_array:
-        """Return the matrix (3 n, 3 n_s) that gives each vertex M r of its partner, and nothing without one."""
-        n, n_s = len(matrices), len(template.vertices)
-        v = np.flatnonzero(feet.found)
-        values = matrices[v][:, :, None, :] * feet.weights[v][:, None, :, None]
-        rows = np.broadcast_to((3 * v[:, None] + np.arange(3))[:, :, None, None], values.shape)
-        columns = 3 * template.faces[feet.faces[v]][:, :, None] + np.arange(3)
-        columns = np.broadcast_to(columns[:, None], values.shape)
-        return sparse.coo_array((values.ravel(), (rows.ravel(), columns.ravel())), shape=(3 * n, 3 * n_s)).tocsr()
 
     def solve(self, motion: NDArray, *, progress: Progress = silent) -> NDArray[np.float64]:
         """Return the avatar's displacements (k, n, 3) for the template's (k, n_s, 3)."""
@@ -170,18 +172,41 @@ def rotation_between(a: NDArray, b: NDArray) -> NDArray[np.float64]:
     return np.eye(3) + skew + skew @ skew / np.maximum(1 + cosine, 1e-6)[:, None, None]
 
 
-def landmark_matrix(places: Mapping[str, tuple[NDArray, NDArray]], names: tuple[str, ...],
-                    matrices: NDArray, n_s: int) -> sparse.csr_array:
-    """Return the matrix (3 l, 3 n_s) that makes of the template's motion the landmarks' motion on the avatar (eq. 16).
+def landmark_motion(places: Mapping[str, tuple[NDArray, NDArray]], names: Sequence[str],
+                    matrices: NDArray) -> Followers:
+    """Return how the template's motion moves landmarks on the avatar (eq. 16).
 
     places: the template's; matrices (l, 3, 3): R_t A R_s^T of each landmark's part.
     """
-    vertices = np.array([places[name][0] for name in names])
-    weights = np.array([places[name][1] for name in names])
-    values = matrices[:, :, None, :] * weights[:, None, :, None]                              # (l, c, j, d)
-    rows = np.broadcast_to((3 * np.arange(len(names))[:, None] + np.arange(3))[:, :, None, None], values.shape)
-    columns = np.broadcast_to((3 * vertices[:, :, None] + np.arange(3))[:, None], values.shape)
-    return sparse.coo_array((values.ravel(), (rows.ravel(), columns.ravel())), shape=(3 * len(names), 3 * n_s)).tocsr()
+    return Followers(np.array([places[name][0] for name in names]).reshape(-1, 3),
+                   np.array([places[name][1] for name in names]).reshape(-1, 3), matrices)
+
+
+def _gradient_blocks(surface: Surface, template: Surface, feet: Feet, turns: NDArray, weight: float) -> _Blocks:
+    """Return G^T W R (grad r) Q^T, so many times. feet: of the avatar's triangles."""
+    t = np.flatnonzero(feet.found)
+    s = feet.faces[t]
+    turn = nearest_rotations(turns[surface.faces[t]].mean(axis=1))
+    plane = rotation_between(np.einsum("tij,tj->ti", turn, template.normals[s]), surface.normals[t]) @ turn
+    # d(hat_i)/d(place) . Q . d(hat_j)/d(place): how corner i of t answers corner j of s
+    answer = surface.hat_gradients[t] @ plane @ np.swapaxes(template.hat_gradients[s], 1, 2)
+    answer *= weight * surface.areas[t, None, None]
+    values = (answer[:, :, :, None, None] * turn[:, None, None]).reshape(-1, 3, 3)              # (t, i, j)
+    return _Blocks(np.repeat(surface.faces[t], 3, axis=1).ravel(), np.tile(template.faces[s], (1, 3)).ravel(), values)
+
+
+def _assembled(parts: Sequence[_Blocks], n: int, n_s: int) -> sparse.csr_array:
+    """Return the matrix (3 n, 3 n_s) of blocks, of which those at one place add up."""
+    place = np.concatenate([part.rows.astype(np.int64) * n_s + part.columns for part in parts])
+    values = np.concatenate([part.values for part in parts]).reshape(-1, 9)
+    order = np.argsort(place)
+    place = place[order]
+    first = np.flatnonzero(np.diff(place, prepend=-1))
+    rows, columns = np.divmod(place[first], n_s)
+    starts = np.concatenate([[0], np.cumsum(np.bincount(rows, minlength=n))])
+    blocks = np.add.reduceat(values[order], first).reshape(-1, 3, 3) if len(first) else np.zeros((0, 3, 3))
+    # Not by blocks: SciPy's product by columns is slower that way.
+    return sparse.csr_array(sparse.bsr_array((blocks, columns, starts), shape=(3 * n, 3 * n_s), blocksize=(3, 3)))
 
 
 def _lining(surface: Surface, found: NDArray, sides: NDArray | None) -> tuple[sparse.csr_array, NDArray]:

@@ -6,8 +6,10 @@ template from a file (template_file) that is measured.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -18,6 +20,7 @@ from facegen.blendshapes.recipes import Recipe
 from facegen.face.deformer import Jaw
 from facegen.face.face import Face
 from facegen.face.motion import joined
+from facegen.forked import Aside
 from facegen.geometry.closest import ClosestPoints
 from facegen.geometry.mesh import Mesh
 from facegen.geometry.operators import Surface
@@ -36,14 +39,25 @@ _TEST_OPENING = 10.0    # degrees: the jaw's share of a vertex is read off a pos
 
 
 @dataclass(frozen=True, eq=False)
+class TemplateShapes:
+    """What the k shapes of a template do. ``motion`` (k, n, 3) mm. ``jaw`` (k, 3): opening in degrees, side and forward
+    in mm; ``gaze`` (k, 4): yaw and pitch in degrees, left eye then right. ``tongue``: how that moves beside going with
+    the jaw, or None. ``pieces``: kind -> all of that kind beside the skin, for avatars that have the same."""
+
+    motion: NDArray[np.float64]
+    jaw: NDArray[np.float64]
+    gaze: NDArray[np.float64]
+    tongue: Tongue | None = None
+    pieces: Mapping[str, TemplatePiece] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, eq=False)
 class Template:
     """A neutral skin of n vertices (mm) and its k shapes.
 
-    ``landmarks``: name -> place (3,); ``places``: name -> vertices (3,) of the skin and their weights (3,). ``motion``
-    (k, n, 3) mm. ``jaw`` (k, 3): opening in degrees, side and forward in mm; ``gaze`` (k, 4): yaw and pitch in degrees,
-    left eye then right. ``hinge``: how the jaw moves; ``jaw_share`` (n,): how much of it each vertex takes. ``minus``
-    (k,): the shape to take away from the result, or -1. ``tongue``: how that moves beside going with the jaw, or None.
-    ``pieces``: kind -> all of that kind beside the skin, for avatars that have the same. ``margins``: slit -> its
+    ``landmarks``: name -> place (3,); ``places``: name -> vertices (3,) of the skin and their weights (3,). ``hinge``:
+    how the jaw moves; ``jaw_share`` (n,): how much of it each vertex takes. ``minus`` (k,): the shape to take away from
+    the result, or -1. ``make``: makes the `shapes`, which no skin needs before it is laid. ``margins``: slit -> its
     edges, as far as they are known already.
     """
 
@@ -52,15 +66,29 @@ class Template:
     landmarks: Mapping[str, NDArray]
     places: Mapping[str, tuple[NDArray, NDArray]]
     names: tuple[str, ...]
-    motion: NDArray[np.float64]
-    jaw: NDArray[np.float64]
-    gaze: NDArray[np.float64]
     hinge: Jaw | None
     jaw_share: NDArray[np.float64]
     minus: tuple[int, ...]
-    tongue: Tongue | None = None
-    pieces: Mapping[str, TemplatePiece] = field(default_factory=dict)
+    make: Callable[[], TemplateShapes]
     margins: Mapping[str, Margins] = field(default_factory=dict)
+
+    @cached_property
+    def shapes(self) -> TemplateShapes:
+        """What the shapes do: made when it is asked for first."""
+        return self.make()
+
+    @contextmanager
+    def making(self) -> Iterator[None]:
+        """Make the shapes in a fork while this process does other things: ``with template.making(): ...``."""
+        with Aside(self.make, useful="shapes" not in vars(self)) as made:
+            yield
+            if made.forked:
+                vars(self)["shapes"] = made.result()
+
+    @property
+    def motion(self) -> NDArray[np.float64]:
+        """How the skin moves in each shape, (k, n, 3) mm."""
+        return self.shapes.motion
 
     @property
     def height(self) -> float:
@@ -70,7 +98,7 @@ class Template:
 
 def places_on(surface: Surface, points: Mapping[str, NDArray]) -> dict[str, tuple[NDArray, NDArray]]:
     """Return for every point the vertices (3,) and weights (3,) of the nearest place on the surface."""
-    feet = ClosestPoints(surface)(np.array(list(points.values())))
+    feet = ClosestPoints(surface)(np.array(list(points.values())).reshape(-1, 3))
     return {name: (surface.faces[face], weights)
             for name, face, weights in zip(points, feet.faces, feet.weights, strict=True)}
 
@@ -94,9 +122,6 @@ def template_of(face: Face, shapes: Mapping[str, Recipe], *, detail: int = DETAI
     n = int(skin[-1]) + 1                                   # the skin comes first, all of its vertices are used
     surface = Surface(mesh.vertices[:n], mesh.faces[mesh.face_parts == 0])
     places = skin_places(face, surface, detail)
-    together = joined(face, [shape.deformation for shape in shapes.values()])
-    posed = face.pose_controls(together, detail=detail)
-    motion = posed[:, :n] - surface.vertices
     hinge = face.deformer.jaw
     opened = np.array([_TEST_OPENING, 0.0, 0.0])
     test = face.pose({"units": "millimetre", "jaw": {"open": _TEST_OPENING}}, detail=detail) - mesh.vertices
@@ -105,16 +130,21 @@ def template_of(face: Face, shapes: Mapping[str, Recipe], *, detail: int = DETAI
     landmarks = {name: weights @ surface.vertices[rows] for name, (rows, weights) in places.items()}
     order = {name: row for row, name in enumerate(shapes)}
     minus = tuple(-1 if shape.minus is None else order[shape.minus] for shape in shapes.values())
-    pieces = {}
-    for kind, parts in _parts_by_kind(mesh).items():
-        rows, own = np.unique(mesh.faces[np.isin(mesh.face_parts, parts)], return_inverse=True)
-        at = mesh.vertices[rows]
-        beside = posed[:, rows] - at - share[rows, None] * hinge.movement(at, together.jaw)
-        pieces[kind] = TemplatePiece(Surface(at, own.reshape(-1, 3)), beside, share[rows])
-    tongue = Tongue(pieces["tongue"].surface, pieces["tongue"].motion, FaceMeasures(landmarks)) \
-        if "tongue" in pieces else None
-    return Template(face.name, surface, landmarks, places, tuple(shapes), motion, together.jaw, together.eyes,
-                    hinge, share[:n], minus, tongue, pieces)
+
+    def make() -> TemplateShapes:
+        together = joined(face, [shape.deformation for shape in shapes.values()])
+        posed = face.pose_controls(together, detail=detail)
+        pieces = {}
+        for kind, parts in _parts_by_kind(mesh).items():
+            rows, own = np.unique(mesh.faces[np.isin(mesh.face_parts, parts)], return_inverse=True)
+            at = mesh.vertices[rows]
+            beside = posed[:, rows] - at - share[rows, None] * hinge.movement(at, together.jaw)
+            pieces[kind] = TemplatePiece(Surface(at, own.reshape(-1, 3)), beside, share[rows])
+        tongue = Tongue(pieces["tongue"].surface, pieces["tongue"].motion, FaceMeasures(landmarks)) \
+            if "tongue" in pieces else None
+        return TemplateShapes(posed[:, :n] - surface.vertices, together.jaw, together.eyes, tongue, pieces)
+
+    return Template(face.name, surface, landmarks, places, tuple(shapes), hinge, share[:n], minus, make)
 
 
 def _parts_by_kind(mesh: Mesh) -> dict[str, list[int]]:
@@ -129,7 +159,7 @@ def skin_places(face: Face, surface: Surface, detail: int) -> dict[str, tuple[ND
     """Return the landmarks on the skin: as they are defined, which tells lips that touch apart; those of other parts,
     the brows', at the nearest place. The pupils are none of the skin's."""
     mesh = face.mesh(detail)
-    result = {}
+    result, elsewhere = {}, {}
     weights = face.landmark_weights(detail)
     for row, name in enumerate(face.landmarks):
         if name.startswith("eye_center"):
@@ -140,5 +170,6 @@ def skin_places(face: Face, surface: Surface, detail: int) -> dict[str, tuple[ND
             fill = 3 - len(columns)
             result[name] = (np.pad(columns, (0, fill), mode="edge"), np.pad(shares, (0, fill)))
         else:
-            result |= places_on(surface, {name: shares @ mesh.vertices[columns]})
-    return result
+            elsewhere[name] = shares @ mesh.vertices[columns]
+    found = result | places_on(surface, elsewhere)
+    return {name: found[name] for name in face.landmarks if name in found}

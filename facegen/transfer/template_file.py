@@ -35,7 +35,7 @@ from facegen.transfer.piece_motion import PieceMotion
 from facegen.transfer.same_pieces import TemplatePiece
 from facegen.transfer.sides import settled, side_fields
 from facegen.transfer.skin import lay_skin
-from facegen.transfer.template import Template, template_of
+from facegen.transfer.template import Template, TemplateShapes, template_of
 from facegen.transfer.tongue import Tongue
 
 LANDMARKS = "landmarks.yaml"
@@ -162,9 +162,9 @@ def _template(file: TemplateFile, kept: Kept | None) -> Template:
     places = parts.places([name for name in landmarks.names if not name.startswith("eye_center")])
     places = settled(parts.surface, places, side_fields(parts.surface, places))
     points = {name: weights @ parts.surface.vertices[rows] for name, (rows, weights) in places.items()}
-    return Template(file.avatar.path.stem, parts.surface, points, places, names, motion[:, parts.rows], jaw,
-                    measured_gaze(pieces, motion), hinge, share[parts.rows], minus, tongue, own,
-                    _margins(parts.surface, places, kept))
+    shapes = TemplateShapes(motion[:, parts.rows], jaw, measured_gaze(pieces, motion), tongue, own)
+    return Template(file.avatar.path.stem, parts.surface, points, places, names, hinge, share[parts.rows], minus,
+                    lambda: shapes, _margins(parts.surface, places, kept))
 
 
 @cache

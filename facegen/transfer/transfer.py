@@ -115,8 +115,9 @@ class Binding:
         progress("telling the pieces apart", 0.0)
         self._parts = parts = take_apart(mesh, landmarks, self.frame, explicit=pieces)
         self.pieces = parts.pieces
-        self.skin = lay_skin(template, parts.surface, parts.places(template.places), kept=kept,
-                             progress=within(progress, 0.1, 1.0))
+        with template.making():
+            self.skin = lay_skin(template, parts.surface, parts.places(template.places), kept=kept,
+                                 progress=within(progress, 0.1, 1.0))
         self._solver: tuple[Weights, Solver] | None = None
         self._made: _Remembered | None = None
 
@@ -192,7 +193,7 @@ class Binding:
 
         def motion(shapes: NDArray[np.int64]) -> NDArray[np.float64]:
             result = solver(shapes)
-            self.skin.open_jaw(result, self.template.jaw[shapes], choices.opening)
+            self.skin.open_jaw(result, self.template.shapes.jaw[shapes], choices.opening)
             return result
 
         return motion

@@ -40,7 +40,7 @@ class WholeMotion:
         self._skin, self._rows, self._n = skin, parts.rows, len(parts.vertices)
         self._hanging = parts.skin
         self._pieces = pieces = PieceMotion(parts.solid, parts.vertices, parts.skin.wound(parts.faces), parts.points)
-        self._same = SamePieces(skin.template.pieces, pieces.pieces, parts.vertices)
+        self._same = SamePieces(skin.template.shapes.pieces, pieces.pieces, parts.vertices)
         self._inner = None if skin.copied else inner_side(skin)
         self._guard = Guard(pieces, None if self._inner is None else self._rows[skin.depth > 0])
         fronts = {f"eye_{s}": EyeFront(ball, parts.vertices[pieces.rows(f"eye_{s}")])
@@ -50,9 +50,9 @@ class WholeMotion:
         self._slits = [one for one in found.values() if one]
         self._lids = [found[slit] for slit in LIDS if found[slit]]
         template, none = skin.template, np.zeros(len(skin.template.names), bool)
-        still = ~(template.jaw.any(axis=1) | template.gaze.any(axis=1))
+        still = ~(template.shapes.jaw.any(axis=1) | template.shapes.gaze.any(axis=1))
         self._closing = still & np.any([lid.closes() for lid in self._lids if lid.eye is not None] or [none], axis=0)
-        self.jaw_moves = template.jaw.any(axis=1) if template.hinge is not None else none
+        self.jaw_moves = template.shapes.jaw.any(axis=1) if template.hinge is not None else none
         """Which shapes (k,) depend on how far the jaw opens."""
         self.lids_close = np.any([lid.narrows() for lid in self._lids] or [none], axis=0)
         """Which shapes (k,) depend on how far lids close."""
@@ -62,7 +62,7 @@ class WholeMotion:
         """Return the displacements (s, n, 3) of all vertices in some shapes (s,) of the template, mm, and what is known
         beside them. on_skin (s, n, 3): the skin's; overwritten."""
         skin, template, pieces = self._skin, self._skin.template, self._pieces
-        jaw, gaze = template.jaw[shapes], template.gaze[shapes]
+        jaw, gaze = template.shapes.jaw[shapes], template.shapes.gaze[shapes]
         # A copy closes as the template does: there is nothing to mend.
         mended = [] if skin.copied and lid_closure == 1.0 else self._lids if skin.copied else self._slits
         slits = [slit.of(shapes, lid_closure) for slit in mended]
@@ -72,7 +72,8 @@ class WholeMotion:
             self._inner.carry(on_skin)
         own = skin.jaw(opening)
         turns = None if own is None else RigidMotions.of(lambda at: own.movement(at, jaw))
-        tongue = None if template.tongue is None else replace(template.tongue, motion=template.tongue.motion[shapes])
+        tongue = template.shapes.tongue
+        tongue = None if tongue is None else replace(tongue, motion=tongue.motion[shapes])
         motion = pieces.move(among_all(on_skin, self._rows, self._n), turns, gaze, tongue=tongue)
         with_jaw = None if own is None else own.movement(pieces.vertices[self._same.rows], jaw)
         self._same.lead(motion, shapes, with_jaw)

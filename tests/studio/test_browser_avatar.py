@@ -61,7 +61,7 @@ def test_landmarks_are_placed_by_clicking_on_pixels(opened, shots):
         away = picker.markers.marks[partner(name)].at - scene.figure.place(scene.placement.apply(true[partner(name)]))
         assert np.linalg.norm(away) / SCALE < 3.0, "its partner is proposed on the other side"
     placed = page.work.avatar.landmarks
-    browser.until(lambda: picker.proposals.advised)         # the face was looked for meanwhile
+    browser.until(lambda: picker.proposals.advised, 180.0)      # the face was looked for meanwhile
     browser.page.screenshot(path=shots / "avatar-landmarks.png")
     browser.press(picker._all.label)
     browser.until(lambda: len(page.work.avatar.landmarks) > len(placed))

@@ -152,15 +152,15 @@ def test_a_tongue_s_own_motion_is_added():
     whole = template_of(load_face(), shape_set("units"))
     row = whole.names.index(shape_of("19"))
     avatar, moves, motion, jaw, gaze = posed("19E")
-    tongue = Tongue(whole.tongue.surface, whole.tongue.motion[row:row + 1], whole.tongue.face)
+    tongue = Tongue(whole.shapes.tongue.surface, whole.shapes.tongue.motion[row:row + 1], whole.shapes.tongue.face)
     out, plain = moves.move(motion, jaw, gaze, tongue=tongue), moves.move(motion, jaw, gaze)
     rows = moves.rows("tongue")
     np.testing.assert_allclose(out[:, rows], motion[:, rows], atol=1e-6)
     assert np.linalg.norm(out[:, rows] - plain[:, rows], axis=2).max() > 10.0
     others = np.setdiff1d(np.arange(len(avatar.vertices)), rows)
     np.testing.assert_array_equal(out[:, others], plain[:, others])
-    own = whole.tongue.surface.vertices
-    ahead = [tongue.moves(own - [0.0, 0.0, back], whole.tongue.face)[0, :, 2].max() for back in (0.0, 5.0)]
+    own = whole.shapes.tongue.surface.vertices
+    ahead = [tongue.moves(own - [0.0, 0.0, back], whole.shapes.tongue.face)[0, :, 2].max() for back in (0.0, 5.0)]
     assert ahead[1] - ahead[0] == pytest.approx(5.0, rel=0.15)
     assert tongue.comes_out()[0] > 5.0
 

@@ -45,7 +45,7 @@ def test_left_shapes_leave_the_right_side_alone(rigged):
     x, clear = skin.registered[:, 0], np.abs(skin.surface.vertices[:, 0]) > 12
     template = skin.template
     # Not of one side on the template either: what draws all of the mouth to the left, and what turns the jaw.
-    whole = {"mouthLeft", *(name for name, jaw in zip(template.names, template.jaw, strict=True) if jaw.any())}
+    whole = {"mouthLeft", *(name for name, jaw in zip(template.names, template.shapes.jaw, strict=True) if jaw.any())}
     left = [name for name in rigged.names if name.endswith(("_L", "Left")) and name not in whole]
     assert len(left) > 30
     for name in left:

@@ -1,5 +1,7 @@
 """Laws of the transfer on copies of the template, and the three published methods beside ours."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from remeshing import errors, remesh_all
@@ -12,7 +14,7 @@ from facegen.geometry.operators import Surface
 from facegen.transfer.baselines import PAPER
 from facegen.transfer.landmarks import snap
 from facegen.transfer.skin import lay_skin
-from facegen.transfer.template import DETAIL, places_on
+from facegen.transfer.template import DETAIL, TemplateShapes, places_on
 from facegen.transfer.transfer import transfer
 
 
@@ -71,10 +73,8 @@ def test_ours_is_nearer_to_the_truth_than_the_published_methods(template, remesh
 
 @pytest.mark.parametrize("method", ["sumner", "cloning", "landmarks"])
 def test_no_motion_gives_none(template, method):
-    from dataclasses import replace
-
-    still = replace(template, motion=np.zeros_like(template.motion[:2]), jaw=np.zeros((2, 3)), gaze=np.zeros((2, 4)),
-                    names=("one", "other"), minus=(-1, -1))
+    shapes = TemplateShapes(np.zeros_like(template.motion[:2]), np.zeros((2, 3)), np.zeros((2, 4)))
+    still = replace(template, make=lambda: shapes, names=("one", "other"), minus=(-1, -1))
     assert np.abs(lay_skin(still, still.surface, still.places).motion(method)).max() < 1e-12
 
 
