@@ -185,7 +185,7 @@ def landmarks(clay: Clay) -> dict[str, NDArray]:
         "jaw_L": on(1.9, -0.3, 1.5),
         "jaw_angle_L": on(1.4, -3.2, 1.6),
         "temple_L": on(1.7, 1.2, 1.9),
-        "head_top": on(0.0, 1.6, -0.4),
+        "head_top": on(0.0, 1.6, -1.0),
     }
 
 
