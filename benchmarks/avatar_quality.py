@@ -67,8 +67,8 @@ def measured(name: str, method: str, folder: Path) -> tuple[str, ...]:
     drift = max(moved[z < BEHIND].mean() for moved in length.values()) / np.ptp(skin.surface.vertices[:, 1])
     forehead = (y > skin.template.landmarks["brow_mid_L"][1] + ABOVE) & (z > 0)
     blink = length["eyeBlinkLeft"]
-    return (f"{lids[0]:.2f}, {lids[1]:.2f}", f"{eye_seen(rigged.path):.3f}", f"{opening:.2f}", f"{closed:.2f}",
-            f"{np.mean(leaks):.2f} ({max(leaks):.2f})", f"{100 * drift:.1f} %",
+    return (f"{lids[0]:.2f}, {lids[1]:.2f}", f"{eye_seen(rigged.path):.3f}", f"{opening:.2f}",
+            f"{round(closed, 2) + 0.0:.2f}", f"{np.mean(leaks):.2f} ({max(leaks):.2f})", f"{100 * drift:.1f} %",
             f"{blink[forehead].max() / blink.max():.3f}")
 
 
