@@ -40,10 +40,11 @@ _OF_OPEN, _TOLERATED_OPEN = 0.2, 0.6
 _ROLLS = 0.5
 # Lids that close by less than this share of the gap keep still.
 _STILL = 0.01
-# A slit counts as shut where the template leaves no more than this share of it, and this many mm.
-_SHUT, _SHUT_MM = 0.06, 0.3
+# A slit counts as shut where the template leaves no more than this share of it open; not at all from the second on.
+_SHUT, _AJAR = 0.06, 0.15
 # Lids keep the distance from the ball that they have at rest, up to so many radii from its centre.
 _ON_THE_BALL = 1.25
+_OFF_THE_BALL = 1.8
 # What moves over this share of the radius is lifted out of the eye, by this share: a rim may lie in the ball at rest.
 _LIFTED, _OUT = 0.15, 0.02
 # Millimetres: a step of this size lifts by half; a smaller one mends what the transfer has laid there well.
@@ -61,18 +62,20 @@ _TINY = 1e-300
 class _Wanted:
     """What k shapes ask of a slit: the ``gap`` (k, SAMPLES, 3), mm; how much it counts, ``active`` (k, SAMPLES); how
     much of the way the upper edge goes (k,); ``left`` (k, SAMPLES): the share of the gap at rest that the template
-    leaves. ``more`` (k, SAMPLES, 3), mm: what the user wants to be added to the gap, None if nothing."""
+    leaves, ``aside`` (k, SAMPLES): by how much of it the edges pass each other. ``more`` (k, SAMPLES, 3), mm: what the
+    user wants to be added to the gap, None if nothing."""
 
     gap: Array
     active: Array
     upper_share: Array
     left: Array
+    aside: Array
     more: Array | None = None
 
     def of(self, shapes: NDArray) -> _Wanted:
         """Return what some of the shapes ask."""
         return _Wanted(self.gap[shapes], self.active[shapes], self.upper_share[shapes], self.left[shapes],
-                       None if self.more is None else self.more[shapes])
+                       self.aside[shapes], None if self.more is None else self.more[shapes])
 
     def closed_more(self, rest: Array, factor: float) -> _Wanted:
         """Return what is asked where lids close so many times as far, up to shut. rest (SAMPLES, 3): the gap then."""
@@ -93,9 +96,9 @@ class _Wanted:
         return self.gap if self.more is None else self.gap + self.more
 
     @property
-    def shut(self) -> NDArray[np.bool_]:
-        """Where (k, SAMPLES) the slit is shut."""
-        return (self.left <= _SHUT) & (np.linalg.norm(self.target, axis=2) <= _SHUT_MM) & (self.active > 0)
+    def shut(self) -> Array:
+        """How far (k, SAMPLES) the slit counts as shut."""
+        return self.active * smooth_step((_AJAR - np.hypot(self.left, self.aside)) / (_AJAR - _SHUT))
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,7 +130,7 @@ class Closing:
 
     def closes(self) -> NDArray[np.bool_]:
         """Return which shapes (k,) shut the slit."""
-        return self.wanted.shut.any(axis=1)
+        return self.wanted.shut.max(axis=1) > 0.5
 
     def close(self, motion: Array) -> None:
         """Add to the displacements (k, n, 3) of the skin what they miss, in place."""
@@ -161,7 +164,7 @@ class Closing:
         """Bring edges that are shut onto one line, no nearer to the eye than either, in displacements (k, all, 3) of
         vertices of which ``rows`` (n,) are the skin's, in place."""
         shut, target = self.wanted.shut, self.wanted.target
-        for k in np.flatnonzero(shut.any(axis=1)):
+        for k in np.flatnonzero(shut.max(axis=1) > _NOTHING):
             upper, lower = self.margins.ends(self.rest + motion[k, rows])
             line = (upper + lower) / 2
             if self.lid is not None:
@@ -188,6 +191,7 @@ class _Lid:
         """edges (e, 2): of the skin rest (r, 3), mm, whose normals are outward (r, 3)."""
         self.eye, self._rest = eye, eye.ball.in_radii(rest)
         self._home = np.linalg.norm(self._rest, axis=1)
+        self._lies = smooth_step((_OFF_THE_BALL - self._home) / (_OFF_THE_BALL - _ON_THE_BALL))
         self._edges, ends = edges, edges.ravel()
         self._by_end = np.argsort(ends, kind="stable")
         self._with_edges, self._starts = np.unique(ends[self._by_end], return_index=True)
@@ -212,7 +216,9 @@ class _Lid:
         rows = changed[on]
         wanted[on] = np.maximum(self._home[rows], self._over(unit, rows) - self._sunk[rows])
         radius = np.linalg.norm(now[changed], axis=1)
-        radius = radius + _beyond(step[changed], _MENDS) * lift * np.maximum(wanted - radius, 0.0)
+        up, down = np.maximum(wanted - radius, 0.0), np.maximum(radius - np.maximum(wanted, self._home[changed]), 0.0)
+        lift = _beyond(step[changed], _MENDS) * lift
+        radius = radius + lift * (up - self._lies[changed] * down)
         return changed, (radius[:, None] * unit[changed]) @ ball.shape + ball.centre
 
     def _over(self, unit: Array, rows: NDArray) -> Array:
@@ -241,7 +247,7 @@ def closing(skin: Skin, slit: Slit, eye: EyeFront | None = None) -> Closing | No
     upper, lower = (np.stack([edge @ one for one in template.motion]) for edge in (own.upper, own.lower))
     part = skin.parts.matrices[slit.name]
     wanted = _told_lips(upper - lower, _jaw_alone(template, own), margins.gap(rest), part) if slit is LIPS else \
-        _told_lids(own.gap(template.surface.vertices), upper, lower, margins.gap(rest), part)
+        _told_lids(*own.ends(template.surface.vertices), upper, lower, margins.gap(rest), part)
     field, lid = closing_field(skin, own, margins), None
     if eye is not None:
         normals = vertex_normals(rest, skin.surface.faces)
@@ -264,12 +270,14 @@ def _told_lips(change: Array, by_jaw: Array, own_gap: Array, part: Array) -> _Wa
     in all and by the jaw alone."""
     parted = np.linalg.norm(change, axis=2) / (_PARTED + _OF_JAW * np.linalg.norm(by_jaw, axis=2))
     return _Wanted(own_gap + change @ part.T, smooth_step(1.0 - parted), np.full(len(change), 0.5),
-                   np.ones(parted.shape))
+                   np.ones(parted.shape), np.zeros(parted.shape))
 
 
-def _told_lids(gap: Array, upper: Array, lower: Array, own_gap: Array, part: Array) -> _Wanted:
-    """Return what the template's lids tell the avatar's. gap, own_gap (SAMPLES, 3): the template's and the avatar's at
-    rest; upper, lower (k, SAMPLES, 3): how the template's edges move; part (3, 3): how movements go on the avatar."""
+def _told_lids(above: Array, below: Array, upper: Array, lower: Array, own_gap: Array, part: Array) -> _Wanted:
+    """Return what the template's lids tell the avatar's. above, below (SAMPLES, 3): the template's edges at rest;
+    upper, lower (k, SAMPLES, 3): how they move; own_gap (SAMPLES, 3): the avatar's gap at rest; part (3, 3): how
+    movements go on the avatar."""
+    gap = above - below
     length = np.linalg.norm(gap, axis=1)
     toward = _unit(gap)
     moved = gap + upper - lower
@@ -277,14 +285,17 @@ def _told_lids(gap: Array, upper: Array, lower: Array, own_gap: Array, part: Arr
     open_at = np.flatnonzero(length > _CORNER)
     if not len(open_at):
         none = np.zeros(ratio.shape)
-        return _Wanted(np.broadcast_to(own_gap, moved.shape), none, np.full(len(moved), 0.5), np.ones(ratio.shape))
+        return _Wanted(np.broadcast_to(own_gap, moved.shape), none, np.full(len(moved), 0.5), np.ones(ratio.shape), none)
     ratio = ratio[:, open_at[np.abs(np.arange(SAMPLES)[:, None] - open_at).argmin(axis=1)]]
     across = moved - ratio[:, :, None] * gap
     target = ratio[:, :, None] * own_gap + across @ part.T
     active = smooth_step(np.abs(1.0 - ratio) / _LEAST_CHANGE)
     ways = [np.abs((edge * toward).sum(axis=2)).sum(axis=1) for edge in (upper, lower)]
     share = np.where(sum(ways) > _TINY, ways[0] / np.maximum(sum(ways), _TINY), 0.5)
-    return _Wanted(target, active, share, ratio)
+    # Edges that slip along each other have met all the same.
+    along = _unit(np.gradient((above + upper + below + lower) / 2, axis=1))
+    aside = across - (across * along).sum(axis=2, keepdims=True) * along
+    return _Wanted(target, active, share, ratio, np.linalg.norm(aside, axis=2) / np.maximum(length, _CORNER))
 
 
 def _beyond(missing: Array, tolerated: ArrayLike = _TOLERATED) -> Array:
@@ -294,5 +305,5 @@ def _beyond(missing: Array, tolerated: ArrayLike = _TOLERATED) -> Array:
 
 
 def _unit(ways: Array) -> Array:
-    """Return the directions (n, 3) of ways (n, 3); zero of none."""
-    return ways / np.maximum(np.linalg.norm(ways, axis=1), _TINY)[:, None]
+    """Return the directions (..., 3) of ways (..., 3); zero of none."""
+    return ways / np.maximum(np.linalg.norm(ways, axis=-1, keepdims=True), _TINY)
