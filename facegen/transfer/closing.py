@@ -114,8 +114,8 @@ class Closing:
         return step
 
     def seal(self, motion: Array, rows: NDArray[np.int64]) -> None:
-        """Bring edges that are shut onto one line, no nearer to the eye than either, in displacements (k, all, 3) of
-        vertices of which ``rows`` (n,) are the skin's, in place."""
+        """Bring edges that are shut to one line, as near as the template's come and no nearer to the eye than either,
+        in displacements (k, all, 3) of vertices of which ``rows`` (n,) are the skin's, in place."""
         shut, target = self.wanted.shut, self.wanted.target
         for k in np.flatnonzero(shut.max(axis=1) > _NOTHING):
             upper, lower = self.margins.ends(self.rest + motion[k, rows])
@@ -125,7 +125,8 @@ class Closing:
                 farther = np.maximum(*(np.linalg.norm(edge - centre, axis=1) for edge in (upper, lower)))
                 line = centre + farther[:, None] * directions(line - centre)
             on = (shut[k] * _beyond(upper - lower - target[k]))[:, None]
-            motion[k, rows[self.field.rows]] += self.field.steps(on * (line - upper), on * (line - lower))
+            half = self.wanted.ajar[k, :, None] * self.gap / 2
+            motion[k, rows[self.field.rows]] += self.field.steps(on * (line + half - upper), on * (line - half - lower))
 
     def _move(self, moved: Array, step: Array, closing: ArrayLike = 0.0) -> None:
         """Move the skin of the field by (r, 3), in place: on an arc round the ball, over what it covers and, as much as

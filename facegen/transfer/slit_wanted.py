@@ -66,8 +66,13 @@ class Wanted:
 
     @property
     def shut(self) -> Array:
-        """How far (k, SAMPLES) the slit counts as shut."""
+        """How much (k, SAMPLES) the slit counts as shut."""
         return self.active * smooth_step((_AJAR - np.hypot(self.left, self.aside)) / (_AJAR - _SHUT))
+
+    @property
+    def ajar(self) -> Array:
+        """The share of the gap (k, SAMPLES) at which edges stay where the slit is shut: nothing, if it is so little."""
+        return self.left * smooth_step(self.left / _SHUT)
 
 
 def jaw_alone(template: Template, own: Margins) -> Array:
