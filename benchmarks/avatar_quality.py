@@ -61,7 +61,7 @@ def measured(name: str, method: str, folder: Path) -> tuple[str, ...]:
     opening = gaps(skin, LIPS, shapes["jawOpen"]).max() / np.linalg.norm(corners[0] - corners[1])
     rest, opened, both = (gaps(skin, LIPS, moved).mean()
                           for moved in (0.0, shapes["jawOpen"], shapes["jawOpen"] + shapes["mouthClose"]))
-    closed = (both - rest) / (opened - rest)
+    closed = round((both - rest) / (opened - rest), 2) + 0.0         # never -0.00
     x, y, z = skin.registered.T
     leaks = [length[shape][x < -BESIDE].mean() / length[shape][x > BESIDE].mean() for shape in ONE_SIDED]
     drift = max(moved[z < BEHIND].mean() for moved in length.values()) / np.ptp(skin.surface.vertices[:, 1])

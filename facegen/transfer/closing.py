@@ -4,8 +4,9 @@ Based on: Onizuka et al. (2018), section 5, which leaves open lids that stay ope
 that face each other. How far the template closes the slit there is told to the avatar's own gap: what the transfer
 missed is added along the avatar's own closing direction, spread over the lid by a smooth field that is 1 on its edge
 and 0 on the other edge and at the brow. Round an eye it moves on an arc about the ball, and a lid's rim, where the
-transfer may scatter what the template keeps together, moves as its edge does. Lips, which may touch at rest, touch
-where the template's have not parted.
+transfer may scatter what the template keeps together, moves as its edge does. Skin that went too far for its eye goes
+back (lid_limits), and a lid that closes lies as near to the ball as at rest, whatever ball the template has. Lips,
+which may touch at rest, touch where the template's have not parted.
 """
 
 from __future__ import annotations
@@ -19,31 +20,22 @@ from facegen.geometry.fade import smooth_step
 from facegen.geometry.normals import vertex_normals
 from facegen.transfer.closing_field import Field, closing_field
 from facegen.transfer.eyeball import EyeFront
-from facegen.transfer.margins import LIPS, SAMPLES, Margins, Slit, facing_margins
+from facegen.transfer.lid_limits import LidLimits, lid_limits
+from facegen.transfer.margins import LIPS, Margins, Slit, facing_margins
 from facegen.transfer.skin import Skin
-from facegen.transfer.template import Template
+from facegen.transfer.slit_wanted import Wanted, directions, jaw_alone, told_lids, told_lips
 
 Array = NDArray[np.float64]
 
-# Places whose gap on the template is below this, mm, are corners: they close as their neighbours do.
-_CORNER = 0.15
-# What the template closes, or opens wider, counts in full from this share of the gap on.
-_LEAST_CHANGE = 0.1
-# Millimetres: lips farther apart than this at some place have parted there; but where the jaw alone would part them,
-# by that much of the way more: a sculptor's lips that close over an open jaw meet no better.
-_PARTED, _OF_JAW = 1.0, 0.2
 # Millimetres: a miss of this size counts half; on a faithful copy there is none to mend.
 _TOLERATED = 0.05
 # Where a slit stays open, this share of what is left counts as little, up to so many millimetres.
 _OF_OPEN, _TOLERATED_OPEN = 0.2, 0.6
 # Millimetres by which a rim may move otherwise than its edge: a lid rolls as it closes.
 _ROLLS = 0.5
-# Lids that close by less than this share of the gap keep still.
-_STILL = 0.01
-# A slit counts as shut where the template leaves no more than this share of it, and this many mm.
-_SHUT, _SHUT_MM = 0.06, 0.3
-# Lids keep the distance from the ball that they have at rest, up to so many radii from its centre.
-_ON_THE_BALL = 1.25
+# Lids keep the distance from the ball that they have at rest, up to so many radii from its centre. Skin farther out may
+# leave it, up to the second of these less and less.
+_ON_THE_BALL, _OFF_THE_BALL = 1.25, 1.8
 # What moves over this share of the radius is lifted out of the eye, by this share: a rim may lie in the ball at rest.
 _LIFTED, _OUT = 0.15, 0.02
 # Millimetres: a step of this size lifts by half; a smaller one mends what the transfer has laid there well.
@@ -58,58 +50,18 @@ _TINY = 1e-300
 
 
 @dataclass(frozen=True, eq=False)
-class _Wanted:
-    """What k shapes ask of a slit: the ``gap`` (k, SAMPLES, 3), mm; how much it counts, ``active`` (k, SAMPLES); how
-    much of the way the upper edge goes (k,); ``left`` (k, SAMPLES): the share of the gap at rest that the template
-    leaves. ``more`` (k, SAMPLES, 3), mm: what the user wants to be added to the gap, None if nothing."""
-
-    gap: Array
-    active: Array
-    upper_share: Array
-    left: Array
-    more: Array | None = None
-
-    def of(self, shapes: NDArray) -> _Wanted:
-        """Return what some of the shapes ask."""
-        return _Wanted(self.gap[shapes], self.active[shapes], self.upper_share[shapes], self.left[shapes],
-                       None if self.more is None else self.more[shapes])
-
-    def closed_more(self, rest: Array, factor: float) -> _Wanted:
-        """Return what is asked where lids close so many times as far, up to shut. rest (SAMPLES, 3): the gap then."""
-        closing = np.where(self.narrows, 1.0 - self.left, 0.0)
-        share = np.where(closing * factor < 1.0, factor, 1.0 / np.maximum(closing, _TINY)) - 1.0
-        counts = (self.active * share * (closing > 0))[:, :, None]
-        return replace(self, left=np.where(closing > 0, 1.0 - closing * (share + 1.0), self.left),
-                       more=counts * (self.gap - rest))
-
-    @property
-    def narrows(self) -> NDArray[np.bool_]:
-        """Where (k, SAMPLES) lids close."""
-        return (self.left < 1.0 - _STILL) & (self.active > 0)
-
-    @property
-    def target(self) -> Array:
-        """The gap (k, SAMPLES, 3) that is wanted after all."""
-        return self.gap if self.more is None else self.gap + self.more
-
-    @property
-    def shut(self) -> NDArray[np.bool_]:
-        """Where (k, SAMPLES) the slit is shut."""
-        return (self.left <= _SHUT) & (np.linalg.norm(self.target, axis=2) <= _SHUT_MM) & (self.active > 0)
-
-
-@dataclass(frozen=True, eq=False)
 class Closing:
     """How one slit of an avatar is closed: built once, for the template's k shapes. ``margins`` and ``field`` are the
     avatar's, ``rest`` (n, 3) its skin, ``gap`` (SAMPLES, 3) the slit then, mm; ``lid``: its lids, if they lie on an
-    eye."""
+    eye; ``limits``: how far the skin of lids may go."""
 
     margins: Margins
     field: Field
     rest: Array
     gap: Array
     lid: _Lid | None
-    wanted: _Wanted
+    wanted: Wanted
+    limits: LidLimits | None = None
 
     @property
     def eye(self) -> EyeFront | None:
@@ -119,7 +71,8 @@ class Closing:
     def of(self, shapes: NDArray[np.int64], lid_closure: float = 1.0) -> Closing:
         """Return how the slit closes in some of the shapes, if lids close so many times as far."""
         wanted = self.wanted.of(shapes)
-        return replace(self, wanted=wanted if lid_closure == 1.0 else wanted.closed_more(self.gap, lid_closure))
+        return replace(self, wanted=wanted if lid_closure == 1.0 else wanted.closed_more(self.gap, lid_closure),
+                       limits=None if self.limits is None else self.limits.of(shapes))
 
     def narrows(self) -> NDArray[np.bool_]:
         """Return in which shapes (k,) lids close."""
@@ -127,12 +80,15 @@ class Closing:
 
     def closes(self) -> NDArray[np.bool_]:
         """Return which shapes (k,) shut the slit."""
-        return self.wanted.shut.any(axis=1)
+        return self.wanted.shut.max(axis=1) > 0.5
 
     def close(self, motion: Array) -> None:
         """Add to the displacements (k, n, 3) of the skin what they miss, in place."""
         wanted, gap = self.wanted, self.gap
         for k in np.flatnonzero(wanted.active.max(axis=1) > 0):
+            closing = 0.0 if self.limits is None else self.limits.closing[k]
+            if self.limits is not None:
+                self._move(motion[k], self.limits.back(k, motion[k, self.field.rows]), closing)
             missing = wanted.active[k, :, None] * (wanted.gap[k] - gap - self.margins.gap(motion[k]))
             still_open = np.linalg.norm(wanted.gap[k], axis=1)
             counts = _beyond(missing, np.minimum(_TOLERATED + _OF_OPEN * still_open, _TOLERATED_OPEN))
@@ -143,9 +99,9 @@ class Closing:
             if counts.max() < _NOTHING:
                 continue
             share = wanted.upper_share[k]
-            self._move(motion[k], self.field.steps(share * missing, (share - 1.0) * missing))
+            self._move(motion[k], self.field.steps(share * missing, (share - 1.0) * missing), closing)
             if self.lid is not None:
-                self._move(motion[k], counts.max() * self._to_edges(motion[k]))
+                self._move(motion[k], counts.max() * self._to_edges(motion[k]), closing)
 
     def _to_edges(self, motion: Array) -> Array:
         """Return what brings the rims, which moved as (n, 3), to where they move as their edges do."""
@@ -158,26 +114,28 @@ class Closing:
         return step
 
     def seal(self, motion: Array, rows: NDArray[np.int64]) -> None:
-        """Bring edges that are shut onto one line, no nearer to the eye than either, in displacements (k, all, 3) of
-        vertices of which ``rows`` (n,) are the skin's, in place."""
+        """Bring edges that are shut to one line, as near as the template's come and no nearer to the eye than either,
+        in displacements (k, all, 3) of vertices of which ``rows`` (n,) are the skin's, in place."""
         shut, target = self.wanted.shut, self.wanted.target
-        for k in np.flatnonzero(shut.any(axis=1)):
+        for k in np.flatnonzero(shut.max(axis=1) > _NOTHING):
             upper, lower = self.margins.ends(self.rest + motion[k, rows])
             line = (upper + lower) / 2
             if self.lid is not None:
                 centre = self.lid.eye.ball.centre
                 farther = np.maximum(*(np.linalg.norm(edge - centre, axis=1) for edge in (upper, lower)))
-                line = centre + farther[:, None] * _unit(line - centre)
+                line = centre + farther[:, None] * directions(line - centre)
             on = (shut[k] * _beyond(upper - lower - target[k]))[:, None]
-            motion[k, rows[self.field.rows]] += self.field.steps(on * (line - upper), on * (line - lower))
+            half = self.wanted.ajar[k, :, None] * self.gap / 2
+            motion[k, rows[self.field.rows]] += self.field.steps(on * (line + half - upper), on * (line - half - lower))
 
-    def _move(self, moved: Array, step: Array) -> None:
-        """Move the skin of the field by (r, 3), in place: on an arc round the ball, and over what it covers."""
+    def _move(self, moved: Array, step: Array, closing: ArrayLike = 0.0) -> None:
+        """Move the skin of the field by (r, 3), in place: on an arc round the ball, over what it covers and, as much as
+        lids close (r,), no farther from it than at rest."""
         rows = self.field.rows
         if self.lid is None:
             moved[rows] += step
             return
-        changed, places = self.lid.moved(self.rest[rows] + moved[rows], step)
+        changed, places = self.lid.moved(self.rest[rows] + moved[rows], step, closing)
         moved[rows[changed]] = places - self.rest[rows[changed]]
 
 
@@ -188,31 +146,35 @@ class _Lid:
         """edges (e, 2): of the skin rest (r, 3), mm, whose normals are outward (r, 3)."""
         self.eye, self._rest = eye, eye.ball.in_radii(rest)
         self._home = np.linalg.norm(self._rest, axis=1)
+        self._lies = smooth_step((_OFF_THE_BALL - self._home) / (_OFF_THE_BALL - _ON_THE_BALL))
         self._edges, ends = edges, edges.ravel()
         self._by_end = np.argsort(ends, kind="stable")
         self._with_edges, self._starts = np.unique(ends[self._by_end], return_index=True)
         self._count = np.maximum(np.bincount(ends, minlength=len(rest)), 1)
         # How much nearer to the eye than clear of it the skin is at rest: it may stay as near; but within the eye, only
         # a lid's back, where nobody sees it.
-        unit, everywhere = _unit(self._rest), np.arange(len(rest))
+        unit, everywhere = directions(self._rest), np.arange(len(rest))
         near = np.maximum(self._over(unit, everywhere) - self._home, 0.0)
         back = (outward * self._rest).sum(axis=1) < 0
         self._sunk = np.where(back | (self._home > eye(unit)), near, 0.0)
 
-    def moved(self, at: Array, step: Array) -> tuple[NDArray[np.int64], Array]:
-        """Return which of the skin's places at (r, 3), mm, a step (r, 3) moves, and where to (s, 3)."""
+    def moved(self, at: Array, step: Array, closing: ArrayLike = 0.0) -> tuple[NDArray[np.int64], Array]:
+        """Return which of the skin's places at (r, 3), mm, a step (r, 3) moves, and where to (s, 3). closing (r,): how
+        much they are laid on the ball if they stand farther from it than at rest."""
         ball = self.eye.ball
         now = ball.in_radii(at)
         then = now + step @ ball.inverse
         changed = np.flatnonzero((step != 0).any(axis=1) & (then != 0).any(axis=1))
-        unit = _unit(then)
+        unit = directions(then)
         lift = np.clip(np.linalg.norm((then - self._rest)[changed], axis=1) / _LIFTED, 0.0, 1.0)
         wanted = np.zeros(len(changed))
         on = self._home[changed] < _ON_THE_BALL
         rows = changed[on]
         wanted[on] = np.maximum(self._home[rows], self._over(unit, rows) - self._sunk[rows])
         radius = np.linalg.norm(now[changed], axis=1)
-        radius = radius + _beyond(step[changed], _MENDS) * lift * np.maximum(wanted - radius, 0.0)
+        off = np.maximum(radius - np.maximum(wanted, self._home[changed]), 0.0)
+        change = np.maximum(wanted - radius, 0.0) - (self._lies * closing)[changed] * off
+        radius = radius + _beyond(step[changed], _MENDS) * lift * change
         return changed, (radius[:, None] * unit[changed]) @ ball.shape + ball.centre
 
     def _over(self, unit: Array, rows: NDArray) -> Array:
@@ -240,59 +202,17 @@ def closing(skin: Skin, slit: Slit, eye: EyeFront | None = None) -> Closing | No
     template, rest = skin.template, skin.surface.vertices
     upper, lower = (np.stack([edge @ one for one in template.motion]) for edge in (own.upper, own.lower))
     part = skin.parts.matrices[slit.name]
-    wanted = _told_lips(upper - lower, _jaw_alone(template, own), margins.gap(rest), part) if slit is LIPS else \
-        _told_lids(own.gap(template.surface.vertices), upper, lower, margins.gap(rest), part)
+    wanted = told_lips(upper - lower, jaw_alone(template, own), margins.gap(rest), part) if slit is LIPS else \
+        told_lids(*own.ends(template.surface.vertices), upper, lower, margins.gap(rest), part)
     field, lid = closing_field(skin, own, margins), None
     if eye is not None:
         normals = vertex_normals(rest, skin.surface.faces)
         lid = _Lid(eye, field.edges, rest[field.rows], normals[field.rows])
-    return Closing(margins, field, rest, margins.gap(rest), lid, wanted)
-
-
-def _jaw_alone(template: Template, own: Margins) -> Array:
-    """Return how the template's jaw alone would change the gap between its lips (k, SAMPLES, 3), mm."""
-    if template.hinge is None:
-        return np.zeros((len(template.shapes.jaw), SAMPLES, 3))
-    used = np.unique(np.concatenate([own.upper.indices, own.lower.indices]))
-    turned = template.hinge.movement(template.surface.vertices[used], template.shapes.jaw)
-    across = (own.upper - own.lower).tocsc()[:, used].toarray()
-    return across @ (template.jaw_share[used, None] * turned)
-
-
-def _told_lips(change: Array, by_jaw: Array, own_gap: Array, part: Array) -> _Wanted:
-    """Return what the template's lips tell the avatar's: see `_told_lids`. change, by_jaw (k, SAMPLES, 3): of the gap,
-    in all and by the jaw alone."""
-    parted = np.linalg.norm(change, axis=2) / (_PARTED + _OF_JAW * np.linalg.norm(by_jaw, axis=2))
-    return _Wanted(own_gap + change @ part.T, smooth_step(1.0 - parted), np.full(len(change), 0.5),
-                   np.ones(parted.shape))
-
-
-def _told_lids(gap: Array, upper: Array, lower: Array, own_gap: Array, part: Array) -> _Wanted:
-    """Return what the template's lids tell the avatar's. gap, own_gap (SAMPLES, 3): the template's and the avatar's at
-    rest; upper, lower (k, SAMPLES, 3): how the template's edges move; part (3, 3): how movements go on the avatar."""
-    length = np.linalg.norm(gap, axis=1)
-    toward = _unit(gap)
-    moved = gap + upper - lower
-    ratio = np.maximum((moved * toward).sum(axis=2) / np.maximum(length, _TINY), 0.0)
-    open_at = np.flatnonzero(length > _CORNER)
-    if not len(open_at):
-        none = np.zeros(ratio.shape)
-        return _Wanted(np.broadcast_to(own_gap, moved.shape), none, np.full(len(moved), 0.5), np.ones(ratio.shape))
-    ratio = ratio[:, open_at[np.abs(np.arange(SAMPLES)[:, None] - open_at).argmin(axis=1)]]
-    across = moved - ratio[:, :, None] * gap
-    target = ratio[:, :, None] * own_gap + across @ part.T
-    active = smooth_step(np.abs(1.0 - ratio) / _LEAST_CHANGE)
-    ways = [np.abs((edge * toward).sum(axis=2)).sum(axis=1) for edge in (upper, lower)]
-    share = np.where(sum(ways) > _TINY, ways[0] / np.maximum(sum(ways), _TINY), 0.5)
-    return _Wanted(target, active, share, ratio)
+    limits = None if slit is LIPS else lid_limits(skin, own, margins, field, wanted.left)
+    return Closing(margins, field, rest, margins.gap(rest), lid, wanted, limits)
 
 
 def _beyond(missing: Array, tolerated: ArrayLike = _TOLERATED) -> Array:
     """Return how much misses (s, 3) count: not at all where a faithful copy misses nothing."""
     square = (missing**2).sum(axis=1)
     return square / (square + tolerated**2)
-
-
-def _unit(ways: Array) -> Array:
-    """Return the directions (n, 3) of ways (n, 3); zero of none."""
-    return ways / np.maximum(np.linalg.norm(ways, axis=1), _TINY)[:, None]

@@ -17,7 +17,7 @@ from facegen.geometry.mesh import Mesh
 from facegen.transfer.alignment import align
 from facegen.transfer.apart import take_apart
 from facegen.transfer.landmarks import load_landmarks
-from facegen.transfer.margins import LIPS, facing_margins
+from facegen.transfer.margins import LIDS, LIPS, facing_margins
 from facegen.transfer.measured_motion import measured_gaze, measured_jaw
 from facegen.transfer.piece_motion import PieceMotion
 from facegen.transfer.rig import Rigging, avatar_path, rig
@@ -122,6 +122,28 @@ def test_lips_meet_over_an_open_jaw_as_another_avatars_do(human, avatar):
         at, at + opened, at + opened + closed))
     assert wide > 10.0                      # mm of a human-sized head
     assert abs(shut - rest) < 0.05 * (wide - rest)
+
+
+@pytest.mark.parametrize(("name", "others"), [("cartoon", ("human", "cat", "horse")), ("cat", ("human",)),
+                                              ("horse", ("human",)), ("human", ("cartoon",))])
+def test_lids_shut_as_on_another_avatar(name, others, tmp_path):
+    """Whatever the size of its eye: a cartoon's are four times as high as a person's. All pairs: see
+    benchmarks/avatar_pairs.py."""
+    blinks = ["AU43_L", "AU43_R"]
+    template = rig(name, tmp_path / f"{name}.glb", shapes=blinks, sets=["units"], normals=False).path
+    for other in others:
+        found = Rigging(other, template=template).shapes()
+        at, mesh = found.skin.surface.vertices, load_avatar(avatar_path(other)).mesh
+        rows = cKDTree(found.frame.apply(mesh.vertices)).query(at)[1]
+        for slit, blink in zip(LIDS, blinks, strict=True):
+            lids, moved = facing_margins(found.skin, slit)[1], found.frame.apply_vectors(found.shapes[blink][rows])
+            rest, shut = lids.gap(at), lids.gap(at + moved)
+            left = np.linalg.norm(shut, axis=1).mean() / np.linalg.norm(rest, axis=1).mean()
+            assert left < 0.05, (other, blink)
+            # Nothing goes much farther than the edge does: no skin of the lid hangs over it.
+            down = -rest[np.linalg.norm(rest, axis=1).argmax()]
+            far = moved @ (down / np.linalg.norm(down))
+            assert far.max() < 1.5 * (lids.upper @ far).max(), (other, blink)
 
 
 def test_a_corrective_alone_brings_what_it_corrects_along_but_does_not_write_it(cartoon, tmp_path):
