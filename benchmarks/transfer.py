@@ -28,8 +28,8 @@ from avatars import decimated_human
 SIZES, QUICK = (6_000, 25_000, 50_000, 100_000), (6_000, 25_000)
 SETS = "units,visemes,vrm"
 SOLVERS = ("scipy", "qdldl")
-# What the tool is held to: seconds of the whole, of registration and of shapes, and MiB, at 25,000 triangles; seconds
-# of the whole at 100,000.
+# What the tool is held to on two cores: seconds by the clock of the whole, of registration and of shapes, and MiB, at
+# 25,000 triangles; seconds of the whole at 100,000.
 GOALS = {25_000: (6.0, 2.0, 3.0, 600), 100_000: (30.0, None, None, None)}
 _PACKAGES = ("numpy", "scipy", "qdldl", "trimesh")
 
@@ -97,8 +97,8 @@ def verdicts(measured: dict[int, dict]) -> list[str]:
             for name, goal, unit in (("whole", whole, "s"), ("registration", registration, "s"),
                                      ("shapes", shapes, "s"), ("peak", peak, "MiB")):
                 if rounds and goal is not None:
-                    value = least(rounds, {"whole": "cpu", "peak": "peak"}.get(name, f"{name}_cpu"))
-                    said = f"{value:.1f} s of CPU" if unit == "s" else f"{value:.0f} MiB"
+                    value = least(rounds, "wall" if name == "whole" else name)
+                    said = f"{value:.1f} s by the clock" if unit == "s" else f"{value:.0f} MiB"
                     lines.append(f"- {size:,} triangles, {solver}: {name} {said} (goal {goal:g}: "
                                  f"{'met' if value <= goal else 'NOT met'}).")
     return lines
