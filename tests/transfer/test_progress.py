@@ -2,6 +2,7 @@
 
 import pytest
 
+from facegen import forked
 from facegen.progress import counted, within
 from facegen.transfer.rig import rig
 
@@ -10,8 +11,16 @@ class Stop(Exception):
     """The user pressed cancel."""
 
 
+@pytest.fixture(scope="module", autouse=True)
+def one_process():
+    """How often two of them tell of shapes depends on which is faster: those are stopped in tests/test_forked.py."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(forked, "may_fork", lambda: False)
+        yield
+
+
 @pytest.fixture(scope="module")
-def told(tmp_path_factory):
+def told(one_process, tmp_path_factory):
     """What was told while the cartoon was rigged."""
     said = []
     rig("cartoon", tmp_path_factory.mktemp("told") / "a.glb", sets=["vrm"], cache=False,
