@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import sparse
 
 from facegen.geometry.operators import Surface
 
@@ -47,6 +48,13 @@ class Feet:
     def found(self) -> NDArray[np.bool_]:
         """Whether there is a foot (p,)."""
         return self.faces >= 0
+
+
+def means(corners: NDArray, weights: NDArray, n: int) -> sparse.csr_array:
+    """Return the matrix (p, n) that makes of values on n vertices those at places, whose weights (p, 3) are of corners
+    (p, 3)."""
+    return sparse.csr_array((weights.ravel(), corners.ravel(), np.arange(0, 3 * len(corners) + 1, 3)),
+                            shape=(len(corners), n))
 
 
 class ClosestPoints:

@@ -91,6 +91,14 @@ class Surface:
         return sides[first].astype(np.int32), of_side.reshape(-1)
 
     @cached_property
+    def neighbours(self) -> sparse.csr_array:
+        """The matrix (n, n) that is one where an edge joins two vertices."""
+        edges, _ = self.edges
+        n = len(self.vertices)
+        both = edges.T.ravel(), edges[:, ::-1].T.ravel()
+        return sparse.csr_array(sparse.coo_array((np.ones(2 * len(edges)), both), shape=(n, n)))
+
+    @cached_property
     def hinges(self) -> tuple[NDArray, NDArray, NDArray]:
         """Pairs of triangles (h, 2) with a common edge, the edge (h,), and the index of the side in each (h, 2).
 

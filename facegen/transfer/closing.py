@@ -86,8 +86,9 @@ class Closing:
         """Add to the displacements (k, n, 3) of the skin what they miss, in place."""
         wanted, gap = self.wanted, self.gap
         for k in np.flatnonzero(wanted.active.max(axis=1) > 0):
-            closing = 0.0 if self.limits is None else self.limits.closing[k]
+            closing = 0.0
             if self.limits is not None:
+                closing = self.limits.closing[k]
                 self._move(motion[k], self.limits.back(k, motion[k, self.field.rows]), closing)
             missing = wanted.active[k, :, None] * (wanted.gap[k] - gap - self.margins.gap(motion[k]))
             still_open = np.linalg.norm(wanted.gap[k], axis=1)

@@ -10,8 +10,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import sparse
 
+from facegen.geometry.closest import means
 from facegen.geometry.fade import smooth_step
 from facegen.transfer.closing_field import Field
 from facegen.transfer.margins import Margins
@@ -60,9 +60,7 @@ def lid_limits(skin: Skin, template: Margins, avatar: Margins, field: Field, lef
     up = np.where(field.lower > field.upper, 1.0, -1.0)[:, None]
     on_template, ways = (up * directions(field.along @ gap) for gap in gaps)
     feet = skin.feet
-    columns = own.faces[feet.faces[rows]]
-    partner = sparse.csr_array((feet.weights[rows].ravel(), (np.repeat(np.arange(len(rows)), 3), columns.ravel())),
-                               shape=(len(rows), len(own.vertices)))
+    partner = means(own.faces[feet.faces[rows]], feet.weights[rows], len(own.vertices))
     most = np.stack([((partner @ one) * on_template).sum(axis=1) for one in motion])
     of_lid = smooth_step(np.maximum(field.upper, field.lower) / _OF_LID) * feet.found[rows]
     closing = smooth_step((1.0 - left - _FROM) / (_TO - _FROM)) @ field.along.T

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 from scipy.sparse.csgraph import connected_components, dijkstra
 
-from facegen.geometry.closest import ClosestPoints
+from facegen.geometry.closest import ClosestPoints, means
 from facegen.geometry.fade import smooth_step
 from facegen.geometry.normals import vertex_normals
 from facegen.geometry.operators import Surface
@@ -139,18 +139,13 @@ def inner_side(skin: Skin) -> InnerSide | None:
     own = np.where(feet.found[rows, None], feet.points[rows], np.inf)
     less = 1.0 - np.minimum(thick / np.maximum(np.linalg.norm(own - opposite, axis=1), _LEAST), 1.0)
     share = _smooth(surface, rows, np.where(feet.found[rows], less, 1.0))
-    n = len(surface.vertices)
-    ends = np.arange(0, 3 * len(rows) + 1, 3)
-    over = sparse.csr_array((weights.ravel(), corners.ravel(), ends), shape=(len(rows), n))
+    over = means(corners, weights, len(surface.vertices))
     return InnerSide(rows, over, share * smooth_step((_THICK - thick) / (_THICK - _THIN)))
 
 
 def _smooth(surface: Surface, rows: NDArray, values: Array) -> Array:
     """Return values (r,) of some vertices as means with those of their neighbours among them."""
-    n = len(surface.vertices)
-    edges, _ = surface.edges
-    join = sparse.csr_array((np.ones(2 * len(edges)), (edges.T.ravel(), edges[:, ::-1].T.ravel())), shape=(n, n))
-    join = (join + sparse.identity(n, format="csr")).tocsr()[rows][:, rows]
+    join = (surface.neighbours + sparse.identity(len(surface.vertices), format="csr")).tocsr()[rows][:, rows]
     count = join.sum(axis=1)
     for _ in range(_ROUNDS):
         values = (join @ values) / count

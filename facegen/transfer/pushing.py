@@ -39,10 +39,7 @@ class Spread:
     """Spreads pushes over the skin: at least the push itself, and less and less of it round it."""
 
     def __init__(self, skin: Surface) -> None:
-        edges, _ = skin.edges
-        n = len(skin.vertices)
-        join = sparse.coo_array((np.ones(2 * len(edges)), (edges.T.ravel(), edges[:, ::-1].T.ravel())), shape=(n, n))
-        join = sparse.csr_array(join)
+        join = skin.neighbours
         degree = np.maximum(np.asarray(join.sum(axis=1)).reshape(-1), 1.0)
         self._mean = sparse.csr_array(join / degree[:, None])
 

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from facegen.fileio.kept import Kept
-from facegen.geometry.closest import Feet
+from facegen.geometry.closest import Feet, means
 from facegen.geometry.normals import vertex_normals
 from facegen.geometry.operators import Surface
 from facegen.progress import Progress, silent
@@ -241,8 +241,7 @@ class Skin:
     def _weights(self, places: NDArray) -> sparse.csr_array:
         """Return the weights (p, n_s) of the template's vertices at what is nearest to places (p, 3)."""
         template, feet = self.template.surface, self.correspondence.nearest(places)
-        return sparse.csr_array((feet.weights.ravel(), template.faces[feet.faces].ravel(),
-                                 np.arange(0, 3 * len(places) + 1, 3)), shape=(len(places), len(template.vertices)))
+        return means(template.faces[feet.faces], feet.weights, len(template.vertices))
 
 
 def lay_skin(template: Template, surface: Surface, places: Mapping[str, tuple[NDArray, NDArray]], *,
