@@ -31,7 +31,7 @@ class Appended:
     """A copy of a file's JSON, with one buffer, to which accessors are added. ``json`` may be changed."""
 
     def __init__(self, file: GltfFile) -> None:
-        self.json: dict[str, Any] = copy.deepcopy(file.json)
+        self.json: dict[str, Any] = _copied(file.json)
         self._pieces: list[bytes] = []
         self._size = 0
         self._kinds: dict[str, tuple[int, list[bytes], int]] = {}      # open bufferViews: index, bytes, size
@@ -166,6 +166,16 @@ class Appended:
             first = {key: value for key, value in first.items() if key != "uri"}
             self.json["buffers"] = [{**first, "byteLength": self._size}]
         return self.json, b"".join(self._pieces)
+
+
+def _copied(value: Any) -> Any:
+    """Return a copy of JSON without members that are null outside extras: to readers they are missing."""
+    if isinstance(value, list):
+        return [_copied(one) for one in value]
+    if not isinstance(value, dict):
+        return value
+    return {key: copy.deepcopy(one) if key == "extras" else _copied(one) for key, one in value.items()
+            if one is not None}
 
 
 def is_ours(found: dict[str, Any], accessor: Any) -> bool:

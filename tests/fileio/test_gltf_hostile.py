@@ -314,6 +314,17 @@ def test_random_json(tmp_path_factory, make, changes):
     load_and_save(tmp_path_factory, gltfs.glb(found, data))
 
 
+@pytest.mark.parametrize("make", [gltfs.morphing, gltfs.vrm])
+def test_null_at_every_place(tmp_path_factory, make):
+    places = len(list(all_places(make()[0])))
+    assert places > 50
+    for number in range(places):
+        found, data = make()
+        box, key = list(all_places(found))[number]
+        box[key] = None
+        load_and_save(tmp_path_factory, gltfs.glb(found, data))
+
+
 def all_places(value):
     """Yield every container and key within a JSON value."""
     for key in (list(value) if isinstance(value, dict) else range(len(value)) if isinstance(value, list) else ()):
