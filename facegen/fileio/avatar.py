@@ -216,9 +216,9 @@ def _plain(notes: Mapping[str, Any]) -> dict[str, Any]:
 def _as_scene(avatar: AvatarFile, shapes: Mapping[str, NDArray[np.float64]], quantise: bool
               ) -> tuple[GltfScene, NDArray[np.int64]]:
     """Return an avatar that is no glTF file as if it were one, and which of its vertices each vertex is."""
-    largest = max((float(np.abs(shape).max(initial=0.0)) for shape in shapes.values()), default=0.0)
     # Quantised motion reaches from -1 to 1: the nodes scale by the power of two that is just enough.
-    scale = 2.0 ** math.ceil(math.log2(largest)) if quantise and largest > 0 else 1.0
+    largest = max((float(np.abs(shape).max(initial=0.0)) for shape in shapes.values()), default=0.0) if quantise else 0
+    scale = 2.0 ** math.ceil(math.log2(largest)) if largest > 0 else 1.0
     file, rows = new_file(avatar.path, avatar.mesh, avatar.colours, avatar.vertex_colours, scale=scale)
     return scene_of(file), rows
 

@@ -7,7 +7,6 @@ the same order, and names stand in ``mesh.extras.targetNames``.
 from __future__ import annotations
 
 import copy
-import itertools
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
@@ -20,26 +19,24 @@ from facegen.fileio.gltf_accessors import Accessors
 from facegen.fileio.gltf_animations import pad_weights
 from facegen.fileio.gltf_append import STEPS, Appended, is_ours
 from facegen.fileio.gltf_local import STILL, Inverse, Motion, same_motions, size_of
-from facegen.fileio.gltf_normals import TurningNormals
-from facegen.fileio.gltf_read import Block, GltfScene, target_names, triangles
+from facegen.fileio.gltf_mesh_normals import MeshNormals, Turning, turn_all
+from facegen.fileio.gltf_read import Block, GltfScene, target_names
 from facegen.fileio.jsontree import Tree
 from facegen.fileio.vrm import add_expressions
-from facegen.forked import for_each
 
 # Because quantised steps must not be seen: half a step is at most this share of the avatar's size.
 _COARSEST_ERROR = 2.5e-4
-# Triangles whose normals are made by one process at a time: fewer are not worth another one.
-_AT_A_TIME = 150_000
 
 
 @dataclass(eq=False)
 class _Use:
-    """Nodes that show one mesh and move it alike. ``motions``: accessor -> name -> motion."""
+    """Nodes that show one mesh and move it alike. ``motions``: accessor -> name -> motion. ``turning``: of normals."""
 
     nodes: list[int]
     blocks: list[Block]
     motions: dict[int, dict[str, Motion]]
     names: list[str] = field(default_factory=list)
+    turning: Turning = field(default_factory=dict)
 
 
 def with_targets(scene: GltfScene, shapes: Mapping[str, NDArray[np.float64]], *, notes: Mapping[str, Any],
@@ -99,6 +96,8 @@ class _Writer:
     def result(self, notes: Mapping[str, Any], expressions: Mapping[str, Mapping[str, float]]
                ) -> tuple[dict[str, Any], bytes]:
         uses = self._uses()
+        if self.normals:
+            self._turn_normals(uses)
         for mesh, found in uses.items():
             self._write_uses(mesh, found)
         pad_weights(self.out, self.tree, self.accessors, self.counts)
@@ -136,6 +135,16 @@ class _Writer:
             home = max(every, key=lambda use: len(use.names))
             home.names = [name for name in self.shapes if name in home.names or name in still]
         return uses
+
+    def _turn_normals(self, uses: Mapping[int, list[_Use]]) -> None:
+        turned: list[tuple[_Use, MeshNormals]] = []
+        for mesh, alike in uses.items():
+            primitives = self.tree.items("meshes")[mesh].items("primitives")
+            normals = MeshNormals(filter(self._needs_normals, primitives), self.accessors)
+            turned += [(use, normals) for use in alike]
+        found = turn_all([(normals, use.motions) for use, normals in turned], self.shapes)
+        for (use, _), turning in zip(turned, found, strict=True):
+            use.turning = turning
 
     def _tolerance(self, blocks: list[Block]) -> float:
         """Return how much two instances' motions may differ in the mesh's space by rounding alone."""
@@ -176,14 +185,13 @@ class _Writer:
         for primitive in primitives:
             if primitive["attributes"].get("POSITION") is None:
                 raise primitive.error("has no POSITION, so its mesh cannot have morph targets")
-        turning = self._normal_changes(use, primitives, ours)
         made: dict[tuple[Any, ...], int] = {}
         for i, primitive in enumerate(primitives):
             targets = target["primitives"][i].setdefault("targets", [])
             targets += [{} for _ in range(len(names) - len(targets))]
             block = next(one for one in use.blocks if i in one.primitives)
             for name in ours:
-                targets[names.index(name)] = self._target(primitive, block, name, use, turning, made)
+                targets[names.index(name)] = self._target(primitive, block, name, use, made)
             if "targetNames" in _extras(primitive):
                 target["primitives"][i]["extras"]["targetNames"] = names
         extras = _extras(mesh)
@@ -199,8 +207,7 @@ class _Writer:
             for k, name in enumerate(names):
                 self.places.setdefault(name, []).append((node, k))
 
-    def _target(self, primitive: Tree, block: Block, name: str, use: _Use, turning: dict, made: dict
-                ) -> dict[str, int]:
+    def _target(self, primitive: Tree, block: Block, name: str, use: _Use, made: dict) -> dict[str, int]:
         """Return a primitive's target: accessors, each made once for primitives that share their vertices."""
         count = block.stop - block.start
         key = (block.accessor, name)
@@ -214,7 +221,7 @@ class _Writer:
         if normal is not None and self._needs_normals(primitive):
             key = (block.accessor, normal.integer(), name)
             if key not in made:
-                made[key] = self._accessor(count, turning.get(key, _NONE), bounds=False)
+                made[key] = self._accessor(count, use.turning.get(key, _NONE), bounds=False)
             result["NORMAL"] = made[key]
         return result
 
@@ -243,47 +250,6 @@ class _Writer:
         if len(motion.rows) and scale / (2 * STEPS) > _COARSEST_ERROR * size:
             raise InputError(f"quantise: steps of 1/{STEPS} unit are too coarse for an avatar of {size:.4g} units; "
                              "write without quantise")
-
-    def _normal_changes(self, use: _Use, primitives, names: list[str]) -> dict[tuple[int, int, str], Motion]:
-        """Return how normals change, by POSITION accessor, NORMAL accessor and name."""
-        if not self.normals:
-            return {}
-        starts: dict[tuple[int, int], int] = {}
-        points, normals, faces, total = [], [], [], 0
-        for primitive in primitives:
-            reference = primitive["attributes"].get("NORMAL")
-            if reference is None or not self._needs_normals(primitive):
-                continue
-            position = primitive["attributes"]["POSITION"]
-            key = (position.integer(), reference.integer())
-            place = self.accessors.floats(position, "VEC3")
-            if key not in starts:
-                starts[key] = total
-                points.append(place)
-                normals.append(self.accessors.floats(reference, "VEC3", count=len(place)))
-                total += len(place)
-            faces.append(triangles(primitive, self.accessors, len(place)) + starts[key])
-        if not starts:
-            return {}
-        surface = TurningNormals(np.concatenate(points), np.concatenate(normals), np.concatenate(faces))
-        ends = [*list(starts.values())[1:], total]
-        moving = {name: found for name in names
-                  if (found := [(first, use.motions[key[0]][name]) for key, first in starts.items()
-                                if name in use.motions[key[0]]])}
-        shapes, each = list(moving.values()), max(1, _AT_A_TIME // max(sum(map(len, faces)), 1))
-
-        def work(i: int) -> list[tuple[NDArray, NDArray]]:
-            return [surface.change(np.concatenate([first + motion.rows for first, motion in shape]),
-                                   np.concatenate([motion.values for _, motion in shape]))
-                    for shape in shapes[i * each:(i + 1) * each]]
-
-        changes = itertools.chain.from_iterable(for_each(-(-len(shapes) // each), work))
-        result = {}
-        for name, (rows, change) in zip(moving, changes, strict=True):
-            for (key, first), end in zip(starts.items(), ends, strict=True):
-                low, high = np.searchsorted(rows, [first, end])
-                result[*key, name] = Motion(rows[low:high] - first, change[low:high])
-        return result
 
     def _all_places(self) -> dict[str, list[tuple[int, int]]]:
         """Return where each shape is, also those that the file had and that were not written now."""
