@@ -42,7 +42,7 @@ class Step:
     repeat: int = 1
 
 
-STEPS = (Step(40.0, 0.02, 0.0, 0.0), Step(40.0, 0.01, 0.002, 40.0, 2), Step(20.0, 0.003, 0.01, 25.0, 2),
+STEPS = (Step(40.0, 0.02, 0.0, 0.0), Step(40.0, 0.01, 0.002, 40.0), Step(20.0, 0.003, 0.01, 25.0),
          Step(10.0, 0.001, 0.05, 15.0, 2), Step(5.0, 0.0, 0.2, 10.0, 2))
 """From stiff to close, in the working frame: a human-sized head in millimetres."""
 

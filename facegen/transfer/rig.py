@@ -19,7 +19,6 @@ from facegen.forked import Aside
 from facegen.progress import Progress, silent, within
 from facegen.transfer.choices import Choices
 from facegen.transfer.halfway import half_name
-from facegen.transfer.landmark_checks import average_face
 from facegen.transfer.landmarks import Landmarks, check_places, load_checked
 from facegen.transfer.pieces import describe
 from facegen.transfer.template import Template, template_of
@@ -114,10 +113,9 @@ class Rigging:
 
         avatar, landmarks: as in `rig`, or what `load_avatar` and `snap` gave. Everything else as in `rig`.
         """
-        self._asked = _asked(sets, shapes, person, template, template_landmarks)
         self._kept = kept_in("registrations") if cache else None
-        average_face()          # which both need: landmarks are compared with it, and the template is made of it
-        with Aside(lambda: _read(avatar, landmarks), useful=not _last.made_of(self._asked.of)) as reading:
+        with Aside(lambda: _read(avatar, landmarks), useful=not _last.made) as reading:
+            self._asked = _asked(sets, shapes, person, template, template_landmarks)
             if reading.forked:
                 self._template()
             self.source, self.places, odd = reading.result()
@@ -245,8 +243,10 @@ class _Last:
     def __init__(self) -> None:
         self._kept: tuple[Hashable, Template] | None = None
 
-    def made_of(self, of: Hashable) -> bool:
-        return self._kept is not None and self._kept[0] == of
+    @property
+    def made(self) -> bool:
+        """Whether there is one."""
+        return self._kept is not None
 
     def template(self, of: Hashable, make: Callable[[], Template]) -> Template:
         """Return it if it was made of this; else make it, and keep it instead."""
