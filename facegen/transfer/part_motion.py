@@ -49,6 +49,10 @@ _MOUTH_LEAST, _MOUTH_MOST = 0.7, 1.4
 _REACH = 0.6
 # The say of "no part": where all parts are farther than about 1.5 reaches, motion is neither turned nor scaled.
 _ELSEWHERE = 0.1
+# Parts of which neither has a say at the other's landmarks: on a muzzle they are turned against each other by a right
+# angle, and the mean of both would roll a lip's middle to a point. Brows and lids, of one skin, go together.
+_APART = ("nose", "mouth")
+_TINY = 1e-300
 # Means of rotations need about five rounds; what is left then is less than this.
 _MOST_ROUNDS, _ROUNDING = 20, 1e-14
 
@@ -109,16 +113,23 @@ def spread(motion: PartMotion, landmarks: Mapping[str, NDArray], at: NDArray) ->
     """Return, for places (n, 3) on the template, matrices (n, 3, 3) for movements and the rotations (n, 3, 3) in them.
 
     Each part's matrix holds near its landmarks; between parts they blend, and far from all of them a movement stays
-    as it is. landmarks: the template's.
+    as it is. At a nose's landmarks the mouth has no say, nor a nose at the mouth's: see `_APART`. landmarks: the
+    template's.
     """
-    total = np.full(len(at), _ELSEWHERE)
-    matrix = np.tile(_ELSEWHERE * np.eye(3), (len(at), 1, 1))
-    turn = matrix.copy()
+    shares = {}
     for part, across, _ in _MEASURED:
         centres = np.array([landmarks[name] for name in MEMBERS[part] if name in landmarks])
         reach = _REACH * np.linalg.norm(landmarks[across[1]] - landmarks[across[0]])
         squared = ((at[:, None, :] - centres[None]) ** 2).sum(axis=2).min(axis=1)
-        share = np.exp(-squared / reach**2)
+        shares[part] = np.exp(-squared / reach**2)
+    nose, mouth = (shares[part] for part in _APART)
+    both = nose * (1.0 - mouth**2), mouth * (1.0 - nose**2)
+    kept = (nose + mouth) / np.maximum(both[0] + both[1], _TINY)
+    shares |= {part: share * kept for part, share in zip(_APART, both, strict=True)}
+    total = np.full(len(at), _ELSEWHERE)
+    matrix = np.tile(_ELSEWHERE * np.eye(3), (len(at), 1, 1))
+    turn = matrix.copy()
+    for part, share in shares.items():
         total += share
         matrix += share[:, None, None] * motion.matrices[part]
         turn += share[:, None, None] * motion.turns[part]
