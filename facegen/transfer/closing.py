@@ -103,6 +103,9 @@ class Closing:
             self._move(motion[k], self.field.steps(share * missing, (share - 1.0) * missing), closing)
             if self.lid is not None:
                 self._move(motion[k], counts.max() * self._to_edges(motion[k]), closing)
+            if self.lid is not None and self.limits is not None:
+                rows = self.field.rows
+                motion[k, rows] += self.lid.back_on(self.rest[rows] + motion[k, rows], self.limits.opening[k])
 
     def _to_edges(self, motion: Array) -> Array:
         """Return what brings the rims, which moved as (n, 3), to where they move as their edges do."""
@@ -177,6 +180,15 @@ class _Lid:
         change = np.maximum(wanted - radius, 0.0) - (self._lies * closing)[changed] * off
         radius = radius + _beyond(step[changed], _MENDS) * lift * change
         return changed, (radius[:, None] * unit[changed]) @ ball.shape + ball.centre
+
+    def back_on(self, at: Array, opening: Array) -> Array:
+        """Return what lays the skin's places at (r, 3), mm, as near to the ball as at rest, as much as lids open
+        (r,)."""
+        now = self.eye.ball.in_radii(at)
+        radius = np.linalg.norm(now, axis=1)
+        off = opening * self._lies * np.maximum(radius - self._home, 0.0)
+        step = -((off / np.maximum(radius, _TINY))[:, None] * now) @ self.eye.ball.shape
+        return _beyond(step, _TOLERATED_OPEN)[:, None] * step
 
     def _over(self, unit: Array, rows: NDArray) -> Array:
         """Return the radius (s,) at which triangles with corners in the directions (r, 3) clear the eye, at some of

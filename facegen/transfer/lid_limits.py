@@ -24,7 +24,7 @@ Array = NDArray[np.float64]
 _FARTHER = 1.25
 # It has to keep to that where it goes with an edge by this share or more.
 _OF_LID = 0.2
-# And in shapes that close the lids by more than the first share of the gap, wholly from the second on.
+# And in shapes that close the lids, or open them, by more than the first share of the gap, wholly from the second on.
 _FROM, _TO = 0.1, 0.3
 _TINY = 1e-300
 
@@ -32,17 +32,19 @@ _TINY = 1e-300
 @dataclass(frozen=True, eq=False)
 class LidLimits:
     """``ways`` (r, 3): where lids close to, at the vertices of a field; ``most`` (k, r), mm: how far they may go there
-    in k shapes; ``closing`` (k, r): 1 where lids close, 0 where they are as wide as at rest, or wider; ``of_lid`` (r,):
-    1 on a lid, 0 where its skin ends or the template has none."""
+    in k shapes; ``closing``, ``opening`` (k, r): 1 where lids close or are wider than at rest, 0 where they are as they
+    were; ``of_lid`` (r,): 1 on a lid, 0 where its skin ends or the template has none."""
 
     ways: Array
     most: Array
     closing: Array
+    opening: Array
     of_lid: Array
 
     def of(self, shapes: NDArray) -> LidLimits:
         """Return those of some of the shapes."""
-        return replace(self, most=self.most[shapes], closing=self.closing[shapes])
+        return replace(self, most=self.most[shapes], closing=self.closing[shapes],
+                       opening=self.opening[shapes])
 
     def back(self, shape: int, motion: Array) -> Array:
         """Return what takes displacements (r, 3) in a shape back to where they may go (r, 3)."""
@@ -63,5 +65,6 @@ def lid_limits(skin: Skin, template: Margins, avatar: Margins, field: Field, lef
     partner = means(own.faces[feet.faces[rows]], feet.weights[rows], len(own.vertices))
     most = np.stack([((partner @ one) * on_template).sum(axis=1) for one in motion])
     of_lid = smooth_step(np.maximum(field.upper, field.lower) / _OF_LID) * feet.found[rows]
-    closing = smooth_step((1.0 - left - _FROM) / (_TO - _FROM)) @ field.along.T
-    return LidLimits(ways, _FARTHER * scale * np.maximum(most, 0.0), closing, of_lid)
+    closing, opening = (smooth_step((change - _FROM) / (_TO - _FROM)) @ field.along.T
+                        for change in (1.0 - left, left - 1.0))
+    return LidLimits(ways, _FARTHER * scale * np.maximum(most, 0.0), closing, opening, of_lid)

@@ -99,6 +99,22 @@ def test_a_face_without_landmarks_of_a_slit_has_none(template):
     assert find_margins(template.surface, LIPS, places, sides) is None
 
 
+@pytest.mark.parametrize(("slit", "name"), [(LIDS[0], "AU5_L"), (LIDS[1], "AU5_R")])
+def test_lids_that_open_stay_as_near_to_the_eye(rigged, skin_shapes, slit, name):
+    """Else a camera sees into the socket beside the eye."""
+    skin, side = rigged.found.skin, name[-1]
+    avatar = load_avatar(rigged.path)
+    faces = np.concatenate([avatar.mesh.faces[piece.faces] for piece in rigged.found.pieces
+                            if piece.kind == f"eye_{side}"])
+    eye = rigged.found.frame.apply(avatar.mesh.vertices)[np.unique(faces)]
+    margins = facing_margins(skin, slit)[1]
+    ball = fit_eye([(eye, np.ones(len(eye)))], outward=np.array([0.0, 0.0, 1.0]), width=np.ptp(eye[:, 0]),
+                   opening=margins.ends(skin.surface.vertices)[0].mean(axis=0))
+    rest, wide = (np.linalg.norm(ball.in_radii(margins.ends(skin.surface.vertices + moved)[0]), axis=1)
+                  for moved in (0.0, skin_shapes[name]))
+    assert (wide - rest).max() < 0.05
+
+
 def test_a_step_of_rounding_size_moves_no_lid(rigged):
     """A lid that lies in the eye, where only its front is seen, is not lifted out of it because a rounding moved it."""
     skin, parts = rigged.found.skin, {piece.kind: piece for piece in rigged.found.pieces}
