@@ -57,6 +57,11 @@ def means(corners: NDArray, weights: NDArray, n: int) -> sparse.csr_array:
                             shape=(len(corners), n))
 
 
+def contradict(some: NDArray, others: NDArray) -> NDArray[np.bool_]:
+    """Return whether labels (..., k) say that two places lie on different sides of a slit."""
+    return (some * others <= _CONTRADICTION).any(axis=-1)
+
+
 class ClosestPoints:
     """A search over one surface: built once, asked often."""
 
@@ -93,7 +98,7 @@ class ClosestPoints:
             np.einsum("pi,pki->pk", normals, self.surface.normals[near])
         allowed = facing > least_cosine
         if labels is not None:
-            allowed &= (labels[0][:, None, :] * labels[1][near] > _CONTRADICTION).all(axis=2)
+            allowed &= ~contradict(labels[0][:, None, :], labels[1][near])
         v, w = np.zeros((2, len(points), k))
         square = np.full((len(points), k), np.inf)              # of the distance
         columns = np.ascontiguousarray(points.T)

@@ -24,6 +24,7 @@ from scipy.spatial import cKDTree
 
 from facegen.geometry.closest import ClosestPoints, Feet
 from facegen.geometry.factor import Factor
+from facegen.geometry.fade import smooth_step
 from facegen.geometry.normals import vertex_normals
 from facegen.geometry.operators import Surface, dirichlet, hinge_energy
 from facegen.progress import Progress, counted, silent
@@ -50,6 +51,9 @@ STEPS = (Step(40.0, 0.02, 0.0, 0.0), Step(40.0, 0.01, 0.002, 40.0), Step(20.0, 0
 _HOLD = 1e2
 # Because normals of the registered skin are those of a rough draft at first: this is wider than the final match.
 _LEAST_COSINE = 0.1
+# Because a partner that comes or goes must change nothing: it counts in full from this cosine on, and less and less
+# down to the least one.
+_FULL_COSINE = 0.5
 # Because a place beyond the template's border has its nearest place on the border: this far in mm, it has no partner.
 _PAST = 1.0
 # Millimetres: a vertex this near to one of the template's is that one, if they look the same way: a copy's own.
@@ -94,6 +98,13 @@ class Correspondence:
             beyond |= feet.found & torn(sides, self._face_sides[feet.faces], self._painted)
         return Feet(np.where(beyond, -1, feet.faces), feet.weights, feet.points, feet.distances)
 
+    def trust(self, feet: Feet, normals: NDArray) -> NDArray[np.float64]:
+        """Return how much partners (p,) count, 0 to 1, of places with normals (p, 3): those that look another way
+        count less, and none not at all; a copy's own in full."""
+        cosine = np.einsum("pi,pi->p", normals, self.template.normals[feet.faces])
+        faces_alike = smooth_step((cosine - _LEAST_COSINE) / (_FULL_COSINE - _LEAST_COSINE))
+        return np.where(feet.found, np.where(feet.distances < _COPY, 1.0, faces_alike), 0.0)
+
     def _itself(self, points: NDArray, normals: NDArray, sides: NDArray, feet: Feet) -> Feet:
         """Return the feet with those of points that coincide with a vertex at that vertex: where the surface folds, a
         vertex' normal may be far from those of all its triangles."""
@@ -135,9 +146,11 @@ def register(surface: Surface, sides: NDArray, landmarks: sparse.csr_array, targ
         pull = np.zeros(n)
         goal = x
         if step.close:
-            feet = correspondence(x, vertex_normals(x, surface.faces), sides, reach=step.reach)
+            normals = vertex_normals(x, surface.faces)
+            feet = correspondence(x, normals, sides, reach=step.reach)
             # Near the reach a partner counts less: one that comes and goes would make steps jump.
             fade = np.where(feet.found, 1 - np.minimum(feet.distances / max(step.reach, 1e-9), 1) ** 2, 0.0)
+            fade *= correspondence.trust(feet, normals)
             pull, goal = step.close * area * fade, np.where(feet.found[:, None], feet.points, x)
         energy = step.smooth * smooth + step.stay * stay
         floor = 1e-9 * energy.diagonal().mean()

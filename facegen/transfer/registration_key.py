@@ -12,8 +12,9 @@ from facegen.fileio.kept import content_key
 from facegen.geometry.operators import Surface
 from facegen.transfer.template import Template
 
-CODE = ("geometry/closest.py", "geometry/factor.py", "geometry/normals.py", "geometry/operators.py",
-        "transfer/registration.py", "transfer/sides.py", "transfer/skin.py", "transfer/template.py")
+CODE = ("geometry/closest.py", "geometry/factor.py", "geometry/fade.py", "geometry/normals.py",
+        "geometry/operators.py", "transfer/registration.py", "transfer/sides.py", "transfer/skin.py",
+        "transfer/template.py")
 """The files that decide how a skin is registered: when one changes, what was kept counts no more."""
 
 

@@ -82,6 +82,11 @@ class Skin:
         return self._without_deep(found, self.depth)
 
     @cached_property
+    def trust(self) -> NDArray[np.float64]:
+        """How much each vertex' partner counts (n,), 0 to 1: see `Correspondence.trust`."""
+        return self.correspondence.trust(self.feet, vertex_normals(self.registered, self.surface.faces))
+
+    @cached_property
     def lips(self) -> tuple[Margins, Margins] | None:
         """The edges of the template's lips and of the skin's, where both have some."""
         return facing_margins(self, LIPS)
@@ -199,21 +204,23 @@ class Skin:
     def system(self, weights: Weights = OURS) -> Transfer:
         """Return the system, on a finer copy of the skin where the template bends more than it can."""
         template, surface, registered = self.template, self.surface, self.registered
-        sides, depth, feet = self.sides, self.depth, self.feet
+        sides, depth, feet, trust = self.sides, self.depth, self.feet, self.trust
         places, followers = self._landmark_motion(blended=True)
         if len(surface.faces) < _FINE_ENOUGH:
             fine, fine_registered, made_of = refine(surface, registered, self._bending(self.without_jaw))
             if len(fine.vertices) > len(surface.vertices):
                 surface, registered, sides, depth = fine, fine_registered, made_of @ sides, made_of @ depth
-                feet = self._without_deep(self.correspondence(
-                    registered, vertex_normals(registered, surface.faces), sides, reach=_REACH), depth)
+                normals = vertex_normals(registered, surface.faces)
+                feet = self._without_deep(self.correspondence(registered, normals, sides, reach=_REACH), depth)
+                trust = self.correspondence.trust(feet, normals)
                 places.resize((places.shape[0], len(surface.vertices)))
         shape = Surface(registered, surface.faces)
         middles = self.correspondence(shape.corners.mean(axis=1), shape.normals, sides[surface.faces].mean(axis=1),
                                       reach=_REACH)
         middles = self._without_deep(middles, depth[surface.faces].mean(axis=1))
         matrices, turns = spread(self.parts, template.landmarks, registered)
-        return Transfer(surface, template.surface, feet, middles, matrices, turns, places, followers, weights, sides)
+        return Transfer(surface, template.surface, feet, middles, matrices, turns, places, followers, weights, sides,
+                        trust=(trust, self.correspondence.trust(middles, shape.normals)))
 
     def _bending(self, motion: NDArray) -> Callable[[NDArray, NDArray], NDArray]:
         """Return what gives for sides (e, 2) between places how far the motion of their middles is from the mean of

@@ -26,9 +26,10 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
+from scipy.spatial import cKDTree
 
 from facegen.errors import InputError
-from facegen.geometry.closest import ClosestPoints, Feet
+from facegen.geometry.closest import Feet, contradict
 from facegen.geometry.factor import Factor
 from facegen.geometry.fade import smooth_step
 from facegen.geometry.operators import Surface, dirichlet, hinge_energy
@@ -47,6 +48,12 @@ _STAY = 0.3
 # But a lining, which is without a partner too, moves as the skin over it does, so that it does not come through: wholly
 # where that skin is no thicker than the first, not at all from the second on, mm.
 _THIN, _THICK = 5.0, 20.0
+# The skin over a lining is the mean of so many of its vertices; one so many mm away, or less, is as near as can be, and
+# beyond that this power of the square of the distance tells.
+_OVER, _CLOSE, _NEAREST = 32, 1.0, 3
+# Skin that lies this little on the other side of a slit may be over a lining too: closest.contradict tells.
+_ASTRIDE = 0.05
+_TINY = 1e-300
 # Shapes that are solved together, to bound the memory.
 _AT_A_TIME = 16
 # Millimetres over which the trust in a partner fades.
@@ -104,16 +111,20 @@ class Transfer:
 
     def __init__(self, surface: Surface, template: Surface, feet: Feet, triangle_feet: Feet, matrices: NDArray,
                  turns: NDArray, landmarks: sparse.csr_array, landmark_motion: Followers,
-                 weights: Weights = OURS, sides: NDArray | None = None) -> None:
+                 weights: Weights = OURS, sides: NDArray | None = None, *,
+                 trust: tuple[NDArray, NDArray]) -> None:
         """surface, template: the skins. feet: of the avatar's vertices (n,), triangle_feet: of its triangles' middles
         (m,). matrices (n, 3, 3): M; turns (n, 3, 3): R. landmarks (l, n); landmark_motion: M r. sides
-        (n, s): `side_fields` of the surface, which keep a lip's lining with its own lip."""
+        (n, s): `side_fields` of the surface, which keep a lip's lining with its own lip. trust (n,), (m,): how much
+        the partners of vertices and of middles count, 0 for none to 1."""
         n, n_s = len(surface.vertices), len(template.vertices)
-        trust = 1 / (1 + (np.where(feet.found, feet.distances, 0) / _FADE) ** 2)
-        lining, lined = _lining(surface, feet.found, sides)
-        anchor = weights.anchor * surface.vertex_areas * np.where(feet.found, trust, _STAY + (1 - _STAY) * lined)
-        share = np.where(triangle_feet.found, 1.0, _ALONE)
-        matrix = weights.gradients * dirichlet(surface, share) + sparse.diags_array(anchor)
+        held, shared = trust
+        lining, lined = _lining(surface, held, sides)
+        near = 1 / (1 + (np.where(feet.found, feet.distances, 0) / _FADE) ** 2)
+        anchor = weights.anchor * surface.vertex_areas
+        by_partner, by_lining = anchor * held * near, anchor * (1 - held)
+        anchor = by_partner + by_lining * (_STAY + (1 - _STAY) * lined)
+        matrix = weights.gradients * dirichlet(surface, _ALONE + (1 - _ALONE) * shared) + sparse.diags_array(anchor)
         if weights.identity:
             matrix = matrix + weights.identity * dirichlet(surface)
         if weights.smooth:
@@ -125,8 +136,8 @@ class Transfer:
         least = _LEAST_ENERGY * energy.max()
         _check_tied(energy > least)
         self._matrix = matrix + sparse.diags_array(_TIE * energy + least)
-        parts = [_gradient_blocks(surface, template, triangle_feet, turns, weights.gradients)]
-        pulled = sparse.diags_array(anchor) @ (sparse.diags_array(feet.found.astype(float)) + lining)
+        parts = [_gradient_blocks(surface, template, triangle_feet, turns, weights.gradients * shared)]
+        pulled = sparse.diags_array(by_partner) + sparse.diags_array(by_lining * (_STAY + (1 - _STAY) * lined)) @ lining
         parts.append(Followers(template.faces[feet.faces], feet.weights, matrices).blocks(pulled))
         if weights.landmarks:
             parts.append(landmark_motion.blocks(weights.landmarks * landmarks.T))
@@ -182,15 +193,16 @@ def landmark_motion(places: Mapping[str, tuple[NDArray, NDArray]], names: Sequen
                    np.array([places[name][1] for name in names]).reshape(-1, 3), matrices)
 
 
-def _gradient_blocks(surface: Surface, template: Surface, feet: Feet, turns: NDArray, weight: float) -> _Blocks:
-    """Return G^T W R (grad r) Q^T, so many times. feet: of the avatar's triangles."""
+def _gradient_blocks(surface: Surface, template: Surface, feet: Feet, turns: NDArray,
+                     weight: NDArray) -> _Blocks:
+    """Return G^T W R (grad r) Q^T, so many times (m,). feet: of the avatar's triangles."""
     t = np.flatnonzero(feet.found)
     s = feet.faces[t]
     turn = nearest_rotations(turns[surface.faces[t]].mean(axis=1))
     plane = rotation_between(np.einsum("tij,tj->ti", turn, template.normals[s]), surface.normals[t]) @ turn
     # d(hat_i)/d(place) . Q . d(hat_j)/d(place): how corner i of t answers corner j of s
     answer = surface.hat_gradients[t] @ plane @ np.swapaxes(template.hat_gradients[s], 1, 2)
-    answer *= weight * surface.areas[t, None, None]
+    answer *= (weight * surface.areas)[t, None, None]
     values = (answer[:, :, :, None, None] * turn[:, None, None]).reshape(-1, 3, 3)              # (t, i, j)
     return _Blocks(np.repeat(surface.faces[t], 3, axis=1).ravel(), np.tile(template.faces[s], (1, 3)).ravel(), values)
 
@@ -209,17 +221,37 @@ def _assembled(parts: Sequence[_Blocks], n: int, n_s: int) -> sparse.csr_array:
     return sparse.csr_array(sparse.bsr_array((blocks, columns, starts), shape=(3 * n, 3 * n_s), blocksize=(3, 3)))
 
 
-def _lining(surface: Surface, found: NDArray, sides: NDArray | None) -> tuple[sparse.csr_array, NDArray]:
-    """Return, for vertices that have no partner (n,), the weights (n, n) of those of the skin over them, and how much
-    they go with it (n,), which is what their weights sum to."""
-    n = len(found)
-    over, lone = surface.faces[found[surface.faces].all(axis=1)], np.flatnonzero(~found)
-    if not len(over) or not len(lone):
-        return sparse.csr_array((n, n)), np.zeros(n)
-    labels = None if sides is None else (sides[lone], sides[over].mean(axis=1))
-    feet = ClosestPoints(Surface(surface.vertices, over))(surface.vertices[lone], labels=labels)
+def _lining(surface: Surface, held: NDArray, sides: NDArray | None) -> tuple[sparse.csr_array, NDArray]:
+    """Return, for vertices that partners do not hold in full (n,), the weights (n, n) of those of the skin over them,
+    and how much they go with it (n,), which is what their weights sum to.
+
+    Not the nearest place alone: which one that is a little change decides.
+    """
+    n = len(held)
+    lone, over = np.flatnonzero(held < 1), np.flatnonzero(held > 0)
+    sides = np.zeros((n, 0)) if sides is None else sides
+    rows, columns, values = [], [], []
     lined = np.zeros(n)
-    lined[lone] = smooth_step((_THICK - np.where(feet.found, feet.distances, np.inf)) / (_THICK - _THIN))
-    values = lined[lone, None] * feet.weights
-    rows = np.repeat(lone, 3)
-    return sparse.csr_array((values.ravel(), (rows, over[feet.faces].ravel())), shape=(n, n)), lined
+    where, of_where = np.unique(np.sign(sides[lone]), axis=0, return_inverse=True)
+    for k, signs in enumerate(where):
+        own = lone[of_where.ravel() == k]
+        there = over[(sides[over] * signs >= -_ASTRIDE).all(axis=1)]
+        if not len(there):
+            continue
+        apart, near = cKDTree(surface.vertices[there]).query(surface.vertices[own], k=min(_OVER, len(there)))
+        apart, near = apart.reshape(len(own), -1), there[near.reshape(len(own), -1)]
+        share = held[near] * surface.vertex_areas[near] / (apart**2 + _CLOSE**2) ** _NEAREST
+        if near.shape[1] == _OVER:                  # the last, at whose distance they end, is not to matter
+            share *= 1.0 - (apart / np.maximum(apart[:, -1:], _TINY)) ** 2
+        share[contradict(sides[own][:, None], sides[near])] = 0.0
+        total = share.sum(axis=1)
+        share /= np.maximum(total, _TINY)[:, None]
+        thick = (share * apart).sum(axis=1)
+        lined[own] = np.where(total > 0, smooth_step((_THICK - thick) / (_THICK - _THIN)), 0.0)
+        rows.append(np.repeat(own, near.shape[1]))
+        columns.append(near.ravel())
+        values.append((lined[own, None] * share).ravel())
+    if not rows:
+        return sparse.csr_array((n, n)), lined
+    return sparse.csr_array((np.concatenate(values), (np.concatenate(rows), np.concatenate(columns))),
+                            shape=(n, n)), lined
