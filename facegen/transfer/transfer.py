@@ -180,7 +180,7 @@ class Binding:
         if not choices.ours or (self._solver is not None and self._solver[0] == weights):
             return
         self._solver = None                         # two are never needed
-        _ = self.skin.feet, self.skin.without_jaw   # which both halves need
+        _ = self.skin.feet, self.template.without_jaw   # which both halves need
         with Aside(lambda: self.skin.system(weights), useful="_whole" not in vars(self)) as system:
             _ = self._whole, self.skin.jaw_share
             self._solver = weights, self.skin.solver(system.result())
