@@ -5,7 +5,8 @@ Based on: C. Ericson, "Real-Time Collision Detection" (2005), section 5.1.5, for
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, fields
 
 import numpy as np
 from numpy.typing import NDArray
@@ -86,8 +87,22 @@ class ClosestPoints:
         signs say on which side of a slit a place lies.
         """
         points = np.asarray(points, float)
+
+        def some(which: slice) -> Feet:
+            return self._nearest(points[which], None if normals is None else normals[which], least_cosine,
+                                 None if labels is None else (labels[0][which], labels[1]))
+
+        if len(points) <= _MANY:
+            return some(slice(None))
+        half = len(points) // 2                     # NumPy and SciPy let two threads work at once
+        with ThreadPoolExecutor(2) as threads:
+            both = list(threads.map(some, (slice(half), slice(half, None))))
+        return Feet(*(np.concatenate([getattr(feet, one.name) for feet in both]) for one in fields(Feet)))
+
+    def _nearest(self, points: NDArray, normals: NDArray | None, least_cosine: float,
+                 labels: tuple[NDArray, NDArray] | None) -> Feet:
         k, rows = min(_TRIED, len(self._owner)), np.arange(len(points))
-        apart, near = self._tree.query(points, k=k, workers=-1 if len(points) > _MANY else 1)
+        apart, near = self._tree.query(points, k=k)
         near, apart = self._owner[near.reshape(len(points), k)], apart.reshape(len(points), k)
         facing = np.full(near.shape, 1.0 if normals is None else -np.inf)
         v, w = np.zeros((2, len(points), k))
