@@ -84,7 +84,7 @@ def our_table(measured: dict[int, dict]) -> str:
             what = f"{size:,}, {solver}" + (", registration kept" if how == "again" else "")
             rows.append((what, seconds(rounds, "load"), seconds(rounds, "registration"), seconds(rounds, "shapes"),
                          seconds(rounds, "save"), seconds(rounds, "whole"), f"{least(rounds, 'peak'):.0f}"))
-    return report.markdown(("triangles, solver", "load", "registration", "shapes", "save", "whole process",
+    return report.markdown(("triangles, solver", "load", "registration", "shapes", "save", "whole",
                             "peak, MiB"), rows)
 
 
@@ -121,7 +121,7 @@ def peer_table(measured: dict[int, dict], peers: dict[int, dict]) -> str:
                             "peak, MiB"), rows)
 
 
-def page(measured: dict[int, dict], peers: dict[int, dict], command: str, load: float) -> str:
+def page(measured: dict[int, dict], peers: dict[int, dict], command: str, load: float, rounds: int) -> str:
     """Return the page in Markdown."""
     shapes = next((one["count"] for found in measured.values() for rounds in found.values() for one in rounds), 0)
     return "\n\n".join([
@@ -129,10 +129,11 @@ def page(measured: dict[int, dict], peers: dict[int, dict], command: str, load: 
         f"`{command}`, {datetime.date.today().isoformat()}, on {report.processor()}, {len(report.cores())} cores, "
         f"{platform.system()}, Python {platform.python_version()}; {', '.join(report.versions(_PACKAGES))}. "
         f"Load of the machine before the run: {load:.1f}.",
-        f"The shipped human, subdivided and decimated, gets {shapes} shapes (`--set {SETS}`) in a GLB with normals. "
-        "CPU seconds of all threads and forks, in brackets wall seconds, which other work on the machine prolongs. "
-        "*Load* is everything before the transfer: reading, checking landmarks, the template. *Shapes* is everything "
-        "after the registration: solve, lids, lips, pieces. *Whole process* begins with the start of Python.",
+        f"`facegen rig --set {SETS}` gives the shipped human, subdivided and decimated, {shapes} shapes in a GLB with "
+        "normals. CPU seconds of all threads and forks, in brackets wall seconds, which other work on the machine "
+        "prolongs. *Load* is everything before the transfer: imports, reading, checking landmarks, the template. "
+        "*Shapes* is everything after the registration: solve, lids, lips, pieces. *Whole* is the command, from the "
+        f"start of Python to the end of the process. The least of {rounds} rounds.",
         our_table(measured), *(["\n".join(lines)] if (lines := verdicts(measured)) else []),
         "## Beside public tools",
         "Registration: trimesh's two (the same skin, template and landmarks, default settings). Shapes: no public tool "
@@ -157,7 +158,7 @@ def main() -> None:
     peers: dict[int, dict] = {}
 
     def write() -> str:
-        text = page(measured, peers, command, load)
+        text = page(measured, peers, command, load, rounds)
         if options.output:                          # after every step: a run may be stopped
             options.output.write_text(text, encoding="utf-8")
         return text

@@ -63,22 +63,24 @@ def used() -> dict[str, float]:
 
 
 def facegen(avatar: str, output: str, solver: str, sets: str, cache: str) -> dict[str, float]:
-    """Rig an avatar as the command does, its steps timed."""
+    """Rig an avatar by the command, its steps timed."""
     if solver == "scipy":
         sys.modules["qdldl"] = None             # as if it were not installed
     os.environ["FACEGEN_CACHE"] = cache
-    clock, start = Clock(), time.perf_counter()
-    from facegen.transfer import rig, transfer
+    clock = Clock()
+    with clock("load"):
+        from facegen.cli.app import run
+        from facegen.transfer import rig, transfer
 
-    clock.on(transfer, "lay_skin", "registration")
-    clock.on(transfer.Binding, "shapes", "shapes")
-    clock.on(rig, "save_avatar", "save")
-    begun = cpu()
-    made = rig.rig(avatar, output, landmarks=Path(avatar).with_suffix(".yaml"), sets=sets.split(","))
+        clock.on(transfer, "lay_skin", "registration")
+        clock.on(transfer.Binding, "shapes", "shapes")
+        clock.on(rig, "save_avatar", "save")
+        if run(["rig", avatar, "-o", output, "--landmarks", str(Path(avatar).with_suffix(".yaml")), "--set", sets]):
+            raise SystemExit("facegen rig: failed")
     found = clock.seconds
-    for unit, whole in (("", time.perf_counter() - start), ("_cpu", cpu() - begun)):
-        found[f"load{unit}"] = whole - sum(found[f"{step}{unit}"] for step in ("registration", "shapes", "save"))
-    return {**found, "count": len(made.names)}
+    for unit in ("", "_cpu"):
+        found[f"load{unit}"] -= sum(found[f"{step}{unit}"] for step in ("registration", "shapes", "save"))
+    return {**found, "count": len(laid_names())}
 
 
 def laid(avatar: str):

@@ -6,6 +6,7 @@ bit. Where it could do harm - beside other threads, in a worker, outside Linux -
 
 from __future__ import annotations
 
+import itertools
 import mmap
 import os
 import pickle
@@ -15,8 +16,9 @@ import sys
 import threading
 import time
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from contextlib import suppress
+from dataclasses import dataclass
 from typing import Generic, TypeVar
 
 import numpy as np
@@ -95,7 +97,7 @@ class Aside(Generic[T]):
         """Return what came of the work. otherwise: what to do where the fork does not answer, instead of the work."""
         found: list[T] = []
         if self._child is not None:
-            found = _answer(self._child[1], _AT_LEAST + _PATIENCE * (time.perf_counter() - self._since))
+            found = _answer(self._child, _AT_LEAST + _PATIENCE * (time.perf_counter() - self._since))
         return found[0] if found else (otherwise or self._work)()
 
     def __enter__(self) -> Aside[T]:
@@ -103,47 +105,74 @@ class Aside(Generic[T]):
 
     def __exit__(self, *_: object) -> None:
         if self._child is not None:
-            pid, pipe = self._child
-            os.close(pipe)
-            os.kill(pid, signal.SIGKILL)        # it is done, or no longer needed
-            os.waitpid(pid, 0)
+            os.close(self._child.pipe)
+            os.close(self._child.store)
+            os.kill(self._child.pid, signal.SIGKILL)        # it is done, or no longer needed
+            os.waitpid(self._child.pid, 0)
 
 
-def _answer(pipe: int, patience: float) -> list[object]:
+@dataclass(frozen=True)
+class _Child:
+    """A fork's process number ``pid``; what it sends the result through: a ``pipe``, and a ``store`` in memory for the
+    numbers of its arrays, which are many."""
+
+    pid: int
+    pipe: int
+    store: int
+
+
+def _answer(child: _Child, patience: float) -> list[object]:
     """Return [what the fork sent], or nothing if it failed, or sent nothing for so many seconds."""
     parts = []
-    while select.select([pipe], [], [], patience)[0]:
-        part = os.read(pipe, 1 << 20)
+    while select.select([child.pipe], [], [], patience)[0]:
+        part = os.read(child.pipe, 1 << 20)
         if not part:
             with suppress(pickle.UnpicklingError, EOFError):        # it was ended amid it
-                return [pickle.loads(b"".join(parts))]              # from our own fork
+                sent, sizes = pickle.loads(b"".join(parts))         # from our own fork
+                return [pickle.loads(sent, buffers=_stored(child.store, sizes))]
             break
         parts.append(part)
     return []
 
 
-def _fork(work: Callable[[], object]) -> tuple[int, int] | None:
-    """Return the number of a fork that does the work and the pipe that it sends the result through; None where the
-    system has no room for one."""
+def _stored(store: int, sizes: list[int]) -> Iterator[memoryview]:
+    """Yield the arrays' numbers, of which each process that writes there has its own."""
+    held = memoryview(mmap.mmap(store, sum(sizes), mmap.MAP_PRIVATE) if any(sizes) else bytearray())
+    for size, end in zip(sizes, itertools.accumulate(sizes), strict=True):
+        yield held[end - size:end]
+
+
+def _fork(work: Callable[[], object]) -> _Child | None:
+    """Return a fork that does the work; None where the system has no room for one."""
     reads, writes = os.pipe()
+    try:
+        store = os.memfd_create("facegen")
+    except OSError:
+        os.close(reads)
+        os.close(writes)
+        return None
     try:
         with warnings.catch_warnings():
             # Python warns of threads that are not its own: those of BLAS, which is ready for a fork.
             warnings.simplefilter("ignore", DeprecationWarning)
             pid = os.fork()
     except OSError:
-        os.close(reads)
-        os.close(writes)
+        for one in (reads, writes, store):
+            os.close(one)
         return None
     if pid:
         os.close(writes)
-        return pid, reads
+        return _Child(pid, reads, store)
     try:
         global _is_fork
         _is_fork = True
         os.close(reads)
+        arrays: list[pickle.PickleBuffer] = []
+        sent = pickle.dumps(work(), protocol=5, buffer_callback=arrays.append)
+        with open(store, "wb") as numbers:
+            sizes = [numbers.write(one.raw()) for one in arrays]
         with open(writes, "wb") as pipe:
-            pickle.dump(work(), pipe, protocol=5)
+            pickle.dump((sent, sizes), pipe, protocol=5)
     except BaseException:               # the parent meets the same error when it does the work itself
         os._exit(1)
     os._exit(0)                         # nothing of the parent's is cleaned up, flushed or told twice

@@ -62,6 +62,26 @@ def test_both_write_into_one_array():
 
 
 @pytest.mark.usefixtures("two_processes")
+def test_arrays_come_back_whole_and_are_ones_own():
+    numbers = np.arange(24.0).reshape(2, 3, 4)
+    made = {"plain": numbers, "other way": np.asfortranarray(numbers), "every other": numbers[:, ::2],
+            "none": np.ones(0), "words": np.array(["a", "b"]), "beside": [numbers.astype("<f4")[0], "text"]}
+    files = len(os.listdir("/proc/self/fd"))
+    with Aside(lambda: made) as later:
+        found = later.result()
+    for name in ("plain", "other way", "every other", "none", "words"):
+        assert found[name].dtype == made[name].dtype
+        assert np.array_equal(found[name], made[name])
+    assert np.array_equal(found["beside"][0], made["beside"][0])
+    found["plain"] += 1                             # ours to change
+    with Aside(lambda: found["plain"].__iadd__(1)) as later:
+        assert later.result()[0, 0, 0] == 2
+    assert found["plain"][0, 0, 0] == 1
+    found = None
+    assert len(os.listdir("/proc/self/fd")) == files
+
+
+@pytest.mark.usefixtures("two_processes")
 @pytest.mark.parametrize("end", [lambda: os._exit(3), lambda: os.kill(os.getpid(), signal.SIGKILL), lambda: 1 / 0])
 def test_what_a_fork_does_not_finish_is_done_here(end):
     def work(i):

@@ -96,7 +96,9 @@ def _nearest(points: Array, centroids: Array, k: int) -> NDArray[np.intp]:
     repeated = np.zeros_like(distance, bool)
     if m % BLOCK:                       # the last block is filled up with its last triangle
         repeated[:] = (candidates == m - 1) & (np.cumsum(candidates == m - 1, axis=1) > 1)
-    order = np.argsort(np.where(repeated, np.inf, distance), axis=1)[:, :k]
+    distance[repeated] = np.inf
+    some = np.argpartition(distance, k - 1, axis=1)[:, :k]
+    order = np.take_along_axis(some, np.take_along_axis(distance, some, axis=1).argsort(axis=1), axis=1)
     return np.take_along_axis(candidates, order, axis=1)
 
 

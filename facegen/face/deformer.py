@@ -30,6 +30,10 @@ CLAMP = 1e-9
 """Barycentric weights down to this are inside: a vertex on the border belongs to both regions."""
 
 
+# A region behind O is infinitely far: in numbers that compare with infinity, no less than this.
+_FAR = 1e300
+
+
 @dataclass(frozen=True)
 class Region:
     """Three feature points (indices), whether the region is rigid with the jaw, and its sheet (or None).
@@ -66,11 +70,12 @@ def region_weights(vertices: Array, points: Array, regions: Sequence[Region], ce
     nearest_corner = np.eye(3)[np.einsum("rkj,nj->nrk", toward, units).argmax(axis=2)]
     clamped = np.where(front[..., None], np.maximum(shares, 0.0), nearest_corner)
     clamped /= clamped.sum(axis=2, keepdims=True)
-    at = np.einsum("nri,rij->nrj", clamped, np.stack([a, b, c], axis=1))
+    at = sum(clamped[..., k, None] * corner for k, corner in enumerate((a, b, c)))
     cosine = np.einsum("nrj,nj->nr", at, rays) / np.maximum(
         np.linalg.norm(at, axis=2) * np.linalg.norm(rays, axis=1, keepdims=True), 1e-12)
     angle = np.arccos(np.clip(cosine, -1.0, 1.0))
-    angle = np.where(front & (shares.min(axis=2) >= -CLAMP), 0.0, angle)
+    least = np.minimum(np.minimum(shares[..., 0], shares[..., 1]), shares[..., 2])
+    angle = np.where(front & (least >= -CLAMP), 0.0, angle)
     of_region = np.array([r.sheet or "" for r in regions])
     of_vertex = np.array([s or "" for s in sheets])
     # A vertex of no sheet may lie in any region; one of a sheet only in its own or in a region of none.
@@ -78,7 +83,9 @@ def region_weights(vertices: Array, points: Array, regions: Sequence[Region], ce
     angle = np.where(wrong, np.inf, angle)
     # Where several regions cover the vertex, the one whose triangle lies nearest to it along the ray.
     depth = np.abs(1.0 - np.where(front, 1.0 / np.where(front, total, 1.0), np.inf))
-    best = np.lexsort((depth.T, np.round(angle, 9).T), axis=0)[0] if len(regions) > 1 else np.zeros(len(rays), int)
+    angle = np.round(angle, 9)
+    nearest = angle <= angle.min(axis=1, keepdims=True)
+    best = np.where(nearest, np.minimum(depth, _FAR), np.inf).argmin(axis=1)
     rows = np.arange(len(rays))
     weights = np.zeros((len(vertices), len(points)))
     for k in range(3):

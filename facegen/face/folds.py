@@ -15,6 +15,9 @@ from facegen.geometry.fade import smooth_step
 
 Array = NDArray[np.float64]
 
+# A fold ends so many of its widths from the curve.
+_REACH = 6.0
+
 
 @dataclass(frozen=True, eq=False)
 class Fold:
@@ -33,6 +36,10 @@ class Fold:
 
 def fold_field(fold: Fold, vertices: Array, normals: Array) -> Array:
     """Return the displacement (n, 3), mm, of each vertex at amount one; it fades toward the curve's ends."""
+    result = np.zeros(vertices.shape)
+    reach = _REACH * fold.width
+    near = ((vertices > fold.along.min(axis=0) - reach) & (vertices < fold.along.max(axis=0) + reach)).all(axis=1)
+    vertices, normals = vertices[near], normals[near]
     start, step = fold.along[:-1], np.diff(fold.along, axis=0)
     length = np.linalg.norm(step, axis=1)
     run = np.concatenate([[0.0], np.cumsum(length)])
@@ -48,5 +55,6 @@ def fold_field(fold: Fold, vertices: Array, normals: Array) -> Array:
     side = np.where(away @ fold.toward < 0, -distance, distance)
     u = side / fold.width
     height = -fold.depth * np.exp(-u * u) + fold.ridge * np.exp(-((u - 2.0) ** 2) / 1.4)
-    height *= fade * (np.abs(u) < 6.0) * np.clip(normals[:, 2] * 4.0 + 1.0, 0.0, 1.0)
-    return height[:, None] * normals
+    height *= fade * (np.abs(u) < _REACH) * np.clip(normals[:, 2] * 4.0 + 1.0, 0.0, 1.0)
+    result[near] = height[:, None] * normals
+    return result

@@ -113,7 +113,7 @@ def save_avatar(avatar: AvatarFile, path: str | os.PathLike[str], shapes: Mappin
         return _save_npz(avatar, path, shapes, notes)
     scene, rows = (avatar.source, None) if isinstance(avatar.source, GltfScene) else _as_scene(avatar, shapes, quantise)
     if rows is not None:
-        shapes = {name: shape[rows] for name, shape in shapes.items()}
+        shapes = {name: np.take(shape, rows, axis=0) for name, shape in shapes.items()}
     found, data = with_targets(scene, shapes, notes=notes, normals=normals, quantise=quantise,
                                expressions=expressions)
     return _save_gltf(path, found, data, scene.file.rest)

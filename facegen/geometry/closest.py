@@ -5,7 +5,8 @@ Based on: C. Ericson, "Real-Time Collision Detection" (2005), section 5.1.5, for
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, fields
 
 import numpy as np
 from numpy.typing import NDArray
@@ -91,24 +92,46 @@ class ClosestPoints:
         signs say on which side of a slit a place lies.
         """
         points = np.asarray(points, float)
+
+        def some(which: slice) -> Feet:
+            return self._nearest(points[which], None if normals is None else normals[which], least_cosine,
+                                 None if labels is None else (labels[0][which], labels[1]))
+
+        if len(points) <= _MANY:
+            return some(slice(None))
+        half = len(points) // 2                     # NumPy and SciPy let two threads work at once
+        with ThreadPoolExecutor(2) as threads:
+            both = list(threads.map(some, (slice(half), slice(half, None))))
+        return Feet(*(np.concatenate([getattr(feet, one.name) for feet in both]) for one in fields(Feet)))
+
+    def _nearest(self, points: NDArray, normals: NDArray | None, least_cosine: float,
+                 labels: tuple[NDArray, NDArray] | None) -> Feet:
         k, rows = min(_TRIED, len(self._owner)), np.arange(len(points))
-        apart, near = self._tree.query(points, k=k, workers=-1 if len(points) > _MANY else 1)
+        apart, near = self._tree.query(points, k=k)
         near, apart = self._owner[near.reshape(len(points), k)], apart.reshape(len(points), k)
-        facing = np.ones(near.shape) if normals is None else \
-            np.einsum("pi,pki->pk", normals, self.surface.normals[near])
-        allowed = facing > least_cosine
-        if labels is not None:
-            allowed &= ~contradict(labels[0][:, None, :], labels[1][near])
+        facing = np.full(near.shape, 1.0 if normals is None else -np.inf)
         v, w = np.zeros((2, len(points), k))
         square = np.full((len(points), k), np.inf)              # of the distance
         columns = np.ascontiguousarray(points.T)
 
         def measure(p: NDArray, j: NDArray) -> None:
-            v[p, j], w[p, j], square[p, j] = _feet(self._triangles.take(near[p, j], axis=1), columns.take(p, axis=1))
+            """Measure those of some triangles that are allowed."""
+            triangle = near[p, j]
+            allowed = np.ones(len(p), bool)
+            if normals is not None:
+                facing[p, j] = looks = _dots(normals.T, p, self.surface.normals.T, triangle)
+                allowed &= looks > least_cosine
+            if labels is not None:
+                for of_point, of_triangle in zip(labels[0].T, labels[1].T, strict=True):
+                    allowed &= of_point.take(p) * of_triangle.take(triangle) > _CONTRADICTION
+            p, j, triangle = p[allowed], j[allowed], triangle[allowed]
+            v[p, j], w[p, j], square[p, j] = _feet(self._triangles.take(triangle, axis=1), columns.take(p, axis=1))
 
-        measure(*np.nonzero(allowed & (np.arange(k) < _FIRST)))
-        hopeful = apart < (1 + _SAME) * (self._reach[near] + np.sqrt(square[:, :_FIRST].min(axis=1))[:, None])
-        measure(*np.nonzero(allowed & (np.arange(k) >= _FIRST) & hopeful))
+        first = min(k, _FIRST)
+        measure(np.repeat(rows, first), np.tile(np.arange(first), len(rows)))
+        hopeful = apart < (1 + _SAME) * (self._reach[near] + np.sqrt(square[:, :first].min(axis=1))[:, None])
+        hopeful[:, :first] = False
+        measure(*np.nonzero(hopeful))
         best = self._best(near, square, facing)
         found = np.isfinite(square[rows, best])
         v, w, faces = v[rows, best], w[rows, best], near[rows, best]
@@ -125,6 +148,11 @@ class ClosestPoints:
         facing = np.where(as_near, facing, -np.inf)
         alike = facing >= facing.max(axis=1)[:, None] - _ALIKE
         return np.where(alike, self._rank[near], len(self._rank)).argmin(axis=1)
+
+
+def _dots(a: NDArray, p: NDArray, b: NDArray, q: NDArray) -> NDArray[np.float64]:
+    """Return the dot products of columns p of a (3, n) with columns q of b (3, m)."""
+    return sum(of_a.take(p) * of_b.take(q) for of_a, of_b in zip(a, b, strict=True))
 
 
 def _planes(corners: NDArray) -> NDArray[np.float64]:

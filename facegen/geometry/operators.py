@@ -110,6 +110,16 @@ class Surface:
         sides = np.stack([order[:-1][same], order[1:][same]], axis=1)
         return sides // 3, of_side[sides[:, 0]], sides % 3
 
+    @cached_property
+    def stretching(self) -> sparse.csc_array:
+        """The `dirichlet` energy (n, n) without weights, EI (Onizuka 2018, eq. 11)."""
+        return dirichlet(self)
+
+    @cached_property
+    def bending(self) -> sparse.csc_array:
+        """The `hinge_energy` (n, n)."""
+        return hinge_energy(self)
+
     def components(self) -> tuple[int, NDArray[np.int32]]:
         """Return the number of connected components and every vertex' component (n,)."""
         n = len(self.vertices)

@@ -165,10 +165,12 @@ class _Lid:
     def moved(self, at: Array, step: Array, closing: ArrayLike = 0.0) -> tuple[NDArray[np.int64], Array]:
         """Return which of the skin's places at (r, 3), mm, a step (r, 3) moves, and where to (s, 3). closing (r,): how
         much they are laid on the ball if they stand farther from it than at rest."""
-        ball = self.eye.ball
+        ball, moving = self.eye.ball, (step != 0).any(axis=1)
+        if not moving.any():                        # most shapes leave an eye's skin as it is
+            return np.zeros(0, np.int64), np.zeros((0, 3))
         now = ball.in_radii(at)
         then = now + step @ ball.inverse
-        changed = np.flatnonzero((step != 0).any(axis=1) & (then != 0).any(axis=1))
+        changed = np.flatnonzero(moving & (then != 0).any(axis=1))
         unit = directions(then)
         lift = np.clip(np.linalg.norm((then - self._rest)[changed], axis=1) / _LIFTED, 0.0, 1.0)
         wanted = np.zeros(len(changed))

@@ -11,7 +11,7 @@ from scipy.spatial import cKDTree
 
 from facegen.geometry.factor import Factor
 from facegen.geometry.fade import smooth_step
-from facegen.geometry.operators import Surface, dirichlet, hinge_energy
+from facegen.geometry.operators import Surface
 from facegen.transfer.margins import SAMPLES, Margins
 from facegen.transfer.skin import Skin
 
@@ -63,7 +63,7 @@ def closing_field(skin: Skin, template: Margins, avatar: Margins) -> Field:
     held[on_edge] = True
     wanted = np.zeros((len(rows), 2))
     wanted[on_edge, 0], wanted[on_edge, 1] = avatar.is_upper, ~avatar.is_upper
-    matrix = hinge_energy(surface) + _STRETCH * dirichlet(surface)
+    matrix = surface.bending + _STRETCH * surface.stretching
     scale = matrix.diagonal().max()
     hold = _HOLD * held
     solved = Factor(matrix + sparse.diags_array(scale * (hold + _TIE)), what="the skin round a slit").solve(

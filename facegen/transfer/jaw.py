@@ -17,7 +17,7 @@ from scipy import sparse
 from facegen.face.deformer import Jaw
 from facegen.geometry.closest import Feet
 from facegen.geometry.factor import Factor
-from facegen.geometry.operators import Surface, dirichlet, hinge_energy
+from facegen.geometry.operators import Surface
 from facegen.transfer.solve import rotation_between
 from facegen.transfer.template import placing
 
@@ -113,7 +113,7 @@ def jaw_share(surface: Surface, feet: Feet, template_faces: NDArray, template_sh
     at = placing(places, list(lips), n)
     firm = np.where(at @ trust > hold, 0.0, hold)           # where there is a partner the template knows the share
     right = trust * carried + at.T @ (firm * np.array(list(lips.values())))
-    matrix = (_SMOOTH * hinge_energy(surface) + 0.05 * dirichlet(surface) + at.T @ (firm[:, None] * at)
+    matrix = (_SMOOTH * surface.bending + 0.05 * surface.stretching + at.T @ (firm[:, None] * at)
               + sparse.diags_array(trust + 1e-6 * area))
     smooth = Factor(matrix, what="the jaw's share of the skin").solve(right)
     same = np.where(found, 1 / (1 + (np.where(found, feet.distances, 0.0) / _SAME) ** 2), 0.0)

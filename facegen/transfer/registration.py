@@ -26,7 +26,7 @@ from facegen.geometry.closest import ClosestPoints, Feet
 from facegen.geometry.factor import Factor
 from facegen.geometry.fade import smooth_step
 from facegen.geometry.normals import vertex_normals
-from facegen.geometry.operators import Surface, dirichlet, hinge_energy
+from facegen.geometry.operators import Surface
 from facegen.progress import Progress, counted, silent
 from facegen.transfer.sides import torn
 
@@ -138,7 +138,7 @@ def register(surface: Surface, sides: NDArray, landmarks: sparse.csr_array, targ
     where the system is singular.
     """
     n = len(surface.vertices)
-    smooth, stay = hinge_energy(surface), dirichlet(surface)
+    smooth, stay = surface.bending, surface.stretching
     area = np.maximum(surface.vertex_areas, 1e-6 * surface.vertex_areas.mean())
     x, factor = surface.vertices.copy(), None
     all_steps = [step for step in steps for _ in range(step.repeat)]

@@ -81,18 +81,22 @@ def avatar_files(avatar: str | Path, landmarks: str | Path | None, *, what: str 
     return path, marks
 
 
-def _read(avatar: str | Path | AvatarFile, landmarks: str | Path | Landmarks | None
-          ) -> tuple[AvatarFile, Landmarks, list[str]]:
-    """Return an avatar and its landmarks, read and checked, and what is odd about these."""
+def _found(avatar: str | Path | AvatarFile, landmarks: str | Path | Landmarks | None
+           ) -> tuple[Path | AvatarFile, Path | Landmarks]:
+    """Return an avatar and its landmarks, or the files they are to be read from. Raises as `avatar_files`."""
     if isinstance(avatar, AvatarFile) and landmarks is not None:
-        source, marks = avatar, landmarks
-    else:
-        file = avatar.path if isinstance(avatar, AvatarFile) else avatar
-        path, marks = avatar_files(file, "" if isinstance(landmarks, Landmarks) else landmarks)
-        source = load_avatar(path)
+        return avatar, landmarks if isinstance(landmarks, Landmarks) else Path(landmarks)
+    path, marks = avatar_files(avatar.path if isinstance(avatar, AvatarFile) else avatar,
+                               "" if isinstance(landmarks, Landmarks) else landmarks)
+    return path, landmarks if isinstance(landmarks, Landmarks) else marks
+
+
+def _read(avatar: Path | AvatarFile, landmarks: Path | Landmarks) -> tuple[AvatarFile, Landmarks, list[str]]:
+    """Return an avatar and its landmarks, read and checked, and what is odd about these."""
+    source = avatar if isinstance(avatar, AvatarFile) else load_avatar(avatar)
     if isinstance(landmarks, Landmarks):
         return source, landmarks, check_places(landmarks, source.mesh)
-    return source, *load_checked(marks, source.mesh, mesh_name=source.path.name, digest=source.digest)
+    return source, *load_checked(landmarks, source.mesh, mesh_name=source.path.name, digest=source.digest)
 
 
 class Rigging:
@@ -114,7 +118,8 @@ class Rigging:
         avatar, landmarks: as in `rig`, or what `load_avatar` and `snap` gave. Everything else as in `rig`.
         """
         self._kept = kept_in("registrations") if cache else None
-        with Aside(lambda: _read(avatar, landmarks), useful=not _last.made) as reading:
+        found = _found(avatar, landmarks)
+        with Aside(lambda: _read(*found), useful=not _last.made) as reading:
             self._asked = _asked(sets, shapes, person, template, template_landmarks)
             if reading.forked:
                 self._template()

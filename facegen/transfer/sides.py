@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from facegen.geometry.factor import Factor
-from facegen.geometry.operators import Surface, dirichlet
+from facegen.geometry.operators import Surface
 from facegen.transfer.template import placing
 
 SLITS = (
@@ -54,7 +54,7 @@ def side_fields(surface: Surface, places: Mapping[str, tuple[NDArray, NDArray]])
     places: landmark -> vertices (3,) and their weights (3,).
     """
     n = len(surface.vertices)
-    matrix = dirichlet(surface) + sparse.diags_array(np.maximum(surface.vertex_areas, 1e-9) / _REACH**2)
+    matrix = surface.stretching + sparse.diags_array(np.maximum(surface.vertex_areas, 1e-9) / _REACH**2)
     rows = [(name, slit, value) for slit, slits in enumerate(SLITS)
             for names, value in zip(slits, (1.0, -1.0, 0.0), strict=True) for name in names if name in places]
     at = placing(places, [name for name, _, _ in rows], n)

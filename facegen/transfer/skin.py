@@ -160,15 +160,6 @@ class Skin:
         for some in _blocks(len(motion) if own is not None else 0):
             motion[some] += self.jaw_share[:, None] * own.movement(self.surface.vertices, jaw[some])
 
-    @cached_property
-    def without_jaw(self) -> NDArray[np.float64]:
-        """The template's displacements (k, n_s, 3) without what its jaw alone would do."""
-        template = self.template
-        if template.hinge is None:
-            return template.motion
-        turned = template.hinge.movement(template.surface.vertices, template.shapes.jaw)
-        return template.motion - template.jaw_share[None, :, None] * turned
-
     def _landmark_motion(self, *, blended: bool = False) -> tuple[sparse.csr_array, Followers]:
         """Return the weights (l, n) that place the parts' landmarks, and how these move (eq. 16).
 
@@ -199,7 +190,7 @@ class Skin:
 
     def solver(self, system: Transfer) -> Solver:
         """Return what solves a `system` for the template's shapes."""
-        return Solver(system, self.without_jaw, len(self.surface.vertices))
+        return Solver(system, self.template.without_jaw, len(self.surface.vertices))
 
     def system(self, weights: Weights = OURS) -> Transfer:
         """Return the system, on a finer copy of the skin where the template bends more than it can."""
@@ -207,7 +198,7 @@ class Skin:
         sides, depth, feet, trust = self.sides, self.depth, self.feet, self.trust
         places, followers = self._landmark_motion(blended=True)
         if len(surface.faces) < _FINE_ENOUGH:
-            fine, fine_registered, made_of = refine(surface, registered, self._bending(self.without_jaw))
+            fine, fine_registered, made_of = refine(surface, registered, self._bending(self.template.without_jaw))
             if len(fine.vertices) > len(surface.vertices):
                 surface, registered, sides, depth = fine, fine_registered, made_of @ sides, made_of @ depth
                 normals = vertex_normals(registered, surface.faces)

@@ -32,7 +32,7 @@ from facegen.errors import InputError
 from facegen.geometry.closest import Feet, contradict
 from facegen.geometry.factor import Factor
 from facegen.geometry.fade import smooth_step
-from facegen.geometry.operators import Surface, dirichlet, hinge_energy
+from facegen.geometry.operators import Surface, dirichlet
 from facegen.progress import Progress, counted, silent
 from facegen.transfer.part_motion import nearest_rotations
 
@@ -126,9 +126,9 @@ class Transfer:
         anchor = by_partner + by_lining * (_STAY + (1 - _STAY) * lined)
         matrix = weights.gradients * dirichlet(surface, _ALONE + (1 - _ALONE) * shared) + sparse.diags_array(anchor)
         if weights.identity:
-            matrix = matrix + weights.identity * dirichlet(surface)
+            matrix = matrix + weights.identity * surface.stretching
         if weights.smooth:
-            matrix = matrix + weights.smooth * hinge_energy(surface)
+            matrix = matrix + weights.smooth * surface.bending
         if weights.landmarks:
             matrix = matrix + weights.landmarks * (landmarks.T @ landmarks)
         matrix = sparse.csc_array(matrix)

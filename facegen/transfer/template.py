@@ -80,15 +80,24 @@ class Template:
     @contextmanager
     def making(self) -> Iterator[None]:
         """Make the shapes in a fork while this process does other things: ``with template.making(): ...``."""
-        with Aside(self.make, useful="shapes" not in vars(self)) as made:
+        with Aside(lambda: (self.shapes, self.without_jaw), useful="shapes" not in vars(self)) as made:
             yield
             if made.forked:
-                vars(self)["shapes"] = made.result()
+                vars(self)["shapes"], vars(self)["without_jaw"] = made.result()
 
     @property
     def motion(self) -> NDArray[np.float64]:
         """How the skin moves in each shape, (k, n, 3) mm."""
         return self.shapes.motion
+
+    @cached_property
+    def without_jaw(self) -> NDArray[np.float64]:
+        """How the skin moves (k, n, 3), without what the jaw alone would do."""
+        if self.hinge is None:
+            return self.motion
+        turned = self.hinge.movement(self.surface.vertices, self.shapes.jaw)
+        turned *= self.jaw_share[:, None]
+        return np.subtract(self.motion, turned, out=turned)
 
     @property
     def height(self) -> float:

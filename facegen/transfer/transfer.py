@@ -155,7 +155,7 @@ class Binding:
         back, own = self.frame.inverse(), self._parts.own
 
         def returned(motion: NDArray) -> NDArray[np.float64]:
-            return back.apply_vectors(motion)[own]
+            return np.take(back.apply_vectors(motion), own, axis=0)
 
         found = {template.names[k]: returned(made.motion[k] if template.minus[k] < 0 else
                                              made.motion[k] - made.motion[template.minus[k]]) for k in wanted}
@@ -180,9 +180,9 @@ class Binding:
         if not choices.ours or (self._solver is not None and self._solver[0] == weights):
             return
         self._solver = None                         # two are never needed
-        _ = self.skin.feet, self.skin.without_jaw   # which both halves need
+        _ = self.skin.feet, self.template.without_jaw   # which both halves need
         with Aside(lambda: self.skin.system(weights), useful="_whole" not in vars(self)) as system:
-            _ = self._whole
+            _ = self._whole, self.skin.jaw_share
             self._solver = weights, self.skin.solver(system.result())
 
     def _skin_motion(self, choices: Choices) -> Callable[[NDArray], NDArray]:
