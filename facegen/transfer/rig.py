@@ -19,6 +19,7 @@ from facegen.forked import Aside
 from facegen.progress import Progress, silent, within
 from facegen.transfer.choices import Choices
 from facegen.transfer.halfway import half_name
+from facegen.transfer.landmark_checks import average_face
 from facegen.transfer.landmarks import Landmarks, check_places, load_checked
 from facegen.transfer.pieces import describe
 from facegen.transfer.template import Template, template_of
@@ -119,6 +120,7 @@ class Rigging:
         """
         self._kept = kept_in("registrations") if cache else None
         found = _found(avatar, landmarks)
+        average_face()          # which both need: landmarks are compared with it, and the template is made of it
         with Aside(lambda: _read(*found), useful=not _last.made) as reading:
             self._asked = _asked(sets, shapes, person, template, template_landmarks)
             if reading.forked:
