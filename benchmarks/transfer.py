@@ -26,7 +26,7 @@ import transfer_parts as parts
 from avatars import decimated_human
 
 SIZES, QUICK = (6_000, 25_000, 50_000, 100_000), (6_000, 25_000)
-SETS = "units,visemes,vrm"
+MADE = parts.SETS, ",".join(parts.shapes())
 SOLVERS = ("scipy", "qdldl")
 # What the tool is held to on two cores: seconds by the clock of the whole, of registration and of shapes, and MiB, at
 # 25,000 triangles; seconds of the whole at 100,000.
@@ -57,7 +57,7 @@ def ours(avatar: Path, folder: Path, rounds: int) -> dict[tuple[str, str], list[
         for solver in SOLVERS:
             for how in ("anew", "again"):
                 cache = folder / f"cache-{avatar.stem}-{solver}-{turn}"
-                one = run(["facegen", str(avatar), str(folder / "out.glb"), solver, SETS, str(cache)], 600.0, folder)
+                one = run(["facegen", str(avatar), str(folder / "out.glb"), solver, *MADE, str(cache)], 600.0, folder)
                 if isinstance(one, str):
                     print(f"{avatar.stem} {solver} {how}: {one}", file=sys.stderr)
                 else:
@@ -123,24 +123,23 @@ def peer_table(measured: dict[int, dict], peers: dict[int, dict]) -> str:
 
 def page(measured: dict[int, dict], peers: dict[int, dict], command: str, load: float, rounds: int) -> str:
     """Return the page in Markdown."""
-    shapes = next((one["count"] for found in measured.values() for rounds in found.values() for one in rounds), 0)
     return "\n\n".join([
         "# How long an avatar takes",
         f"`{command}`, {datetime.date.today().isoformat()}, on {report.processor()}, {len(report.cores())} cores, "
         f"{platform.system()}, Python {platform.python_version()}; {', '.join(report.versions(_PACKAGES))}. "
         f"Load of the machine before the run: {load:.1f}.",
-        f"`facegen rig --set {SETS}` gives the shipped human, subdivided and decimated, {shapes} shapes in a GLB with "
-        "normals. CPU seconds of all threads and forks, in brackets wall seconds, which other work on the machine "
-        "prolongs. *Load* is everything before the transfer: imports, reading, checking landmarks, the template. "
-        "*Shapes* is everything after the registration: solve, lids, lips, pieces. *Whole* is the command, from the "
-        f"start of Python to the end of the process. The least of {rounds} rounds.",
+        f"`facegen rig` gives the shipped human, subdivided and decimated, {parts.COUNT} shapes (the first of `--set "
+        f"{parts.SETS}`) in a GLB with normals. CPU seconds of all threads and forks, in brackets wall seconds, which "
+        "other work on the machine prolongs. *Load* is everything before the transfer: imports, reading, checking "
+        "landmarks, the template. *Shapes* is everything after the registration: solve, lids, lips, pieces. *Whole* is "
+        f"the command, from the start of Python to the end of the process. The least of {rounds} rounds.",
         our_table(measured), *(["\n".join(lines)] if (lines := verdicts(measured)) else []),
         "## Beside public tools",
         "Registration: trimesh's two (the same skin, template and landmarks, default settings). Shapes: no public tool "
         "that installs from PyPI makes them, so *Sumner, a solve for each shape* is a plain re-implementation of what "
         "public scripts do - the normal equations of Sumner and Popović (2004) with a fourth vertex for each triangle, "
         f"given to `scipy.sparse.linalg.spsolve` anew for each shape - of which {parts.SOLVED} shapes were timed and "
-        f"{shapes} extrapolated. It moves the skin alone.",
+        f"{parts.COUNT} extrapolated. It moves the skin alone.",
         peer_table(measured, peers)]) + "\n"
 
 
@@ -165,7 +164,7 @@ def main() -> None:
 
     with tempfile.TemporaryDirectory() as folder:
         avatars = {size: decimated_human(Path(folder), size) for size in sizes}
-        run(["facegen", str(avatars[sizes[0]]), f"{folder}/x.glb", "scipy", SETS, f"{folder}/x"], 600.0, Path(folder))
+        run(["facegen", str(avatars[sizes[0]]), f"{folder}/x.glb", "scipy", *MADE, f"{folder}/x"], 600.0, Path(folder))
         for size, avatar in avatars.items():
             print(f"{size} triangles", file=sys.stderr, flush=True)
             measured[size] = ours(avatar, Path(folder), rounds)

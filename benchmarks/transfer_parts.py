@@ -17,6 +17,8 @@ from pathlib import Path
 
 import numpy as np
 
+# The shapes that are made: the first so many of these sets.
+SETS, COUNT = "units,visemes,vrm", 100
 # Shapes that the plain reference solves; the others are extrapolated.
 SOLVED = 2
 REGISTRATIONS = ("trimesh nricp_sumner", "trimesh nricp_amberg")
@@ -62,8 +64,8 @@ def used() -> dict[str, float]:
     return {"cpu": cpu(), "peak": peak}
 
 
-def facegen(avatar: str, output: str, solver: str, sets: str, cache: str) -> dict[str, float]:
-    """Rig an avatar by the command, its steps timed."""
+def facegen(avatar: str, output: str, solver: str, sets: str, names: str, cache: str) -> dict[str, float]:
+    """Give an avatar some shapes by the command, its steps timed."""
     if solver == "scipy":
         sys.modules["qdldl"] = None             # as if it were not installed
     os.environ["FACEGEN_CACHE"] = cache
@@ -75,12 +77,13 @@ def facegen(avatar: str, output: str, solver: str, sets: str, cache: str) -> dic
         clock.on(transfer, "lay_skin", "registration")
         clock.on(transfer.Binding, "shapes", "shapes")
         clock.on(rig, "save_avatar", "save")
-        if run(["rig", avatar, "-o", output, "--landmarks", str(Path(avatar).with_suffix(".yaml")), "--set", sets]):
+        if run(["rig", avatar, "-o", output, "--landmarks", str(Path(avatar).with_suffix(".yaml")), "--set", sets,
+                "--shapes", names]):
             raise SystemExit("facegen rig: failed")
     found = clock.seconds
     for unit in ("", "_cpu"):
         found[f"load{unit}"] -= sum(found[f"{step}{unit}"] for step in ("registration", "shapes", "save"))
-    return {**found, "count": len(laid_names())}
+    return found
 
 
 def laid(avatar: str):
@@ -97,17 +100,15 @@ def peer(name: str, avatar: str) -> dict[str, float]:
     clock = Clock()
     with clock("step"):
         step()
-    factor = len(laid_names()) / SOLVED if name not in REGISTRATIONS else 1.0
+    factor = len(shapes()) / SOLVED if name not in REGISTRATIONS else 1.0
     return {"step": factor * clock.seconds["step"], "cpu_step": factor * clock.seconds["step_cpu"]}
 
 
-def laid_names() -> list[str]:
-    """Return the shapes that facegen makes in the same run."""
-    from transfer import SETS
-
+def shapes() -> list[str]:
+    """Return the names of the shapes that are made."""
     from facegen.blendshapes.recipes import shape_sets
 
-    return list(shape_sets(SETS.split(",")))
+    return list(shape_sets(SETS.split(",")))[:COUNT]
 
 
 def prepared(name: str, skin) -> Callable[[], object]:

@@ -58,6 +58,14 @@ def means(corners: NDArray, weights: NDArray, n: int) -> sparse.csr_array:
                             shape=(len(corners), n))
 
 
+def means_of_motion(weights: sparse.csr_array, motion: NDArray) -> NDArray[np.float64]:
+    """Return how places (p,) move, (k, p, 3), that are `means` of vertices which move by (k, n, 3): all k at once, and
+    only the vertices that count."""
+    used = np.unique(weights.indices)
+    own = np.moveaxis(motion[:, used], 0, 1).reshape(len(used), -1)
+    return np.moveaxis((weights[:, used] @ own).reshape(weights.shape[0], len(motion), 3), 1, 0)
+
+
 def contradict(some: NDArray, others: NDArray) -> NDArray[np.bool_]:
     """Return whether labels (..., k) say that two places lie on different sides of a slit."""
     return (some * others <= _CONTRADICTION).any(axis=-1)

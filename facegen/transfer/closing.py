@@ -16,6 +16,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from facegen.geometry.closest import means_of_motion
 from facegen.geometry.fade import smooth_step
 from facegen.geometry.normals import vertex_normals
 from facegen.transfer.closing_field import Field, closing_field
@@ -215,7 +216,7 @@ def closing(skin: Skin, slit: Slit, eye: EyeFront | None = None) -> Closing | No
         return None
     own, margins = found
     template, rest = skin.template, skin.surface.vertices
-    upper, lower = (np.stack([edge @ one for one in template.motion]) for edge in (own.upper, own.lower))
+    upper, lower = (means_of_motion(edge, template.motion) for edge in (own.upper, own.lower))
     part = skin.parts.matrices[slit.name]
     wanted = told_lips(upper - lower, jaw_alone(template, own), margins.gap(rest), part) if slit is LIPS else \
         told_lids(*own.ends(template.surface.vertices), upper, lower, margins.gap(rest), part)

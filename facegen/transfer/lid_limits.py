@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from facegen.geometry.closest import means
+from facegen.geometry.closest import means, means_of_motion
 from facegen.geometry.fade import smooth_step
 from facegen.transfer.closing_field import Field
 from facegen.transfer.margins import Margins
@@ -63,7 +63,7 @@ def lid_limits(skin: Skin, template: Margins, avatar: Margins, field: Field, lef
     on_template, ways = (up * directions(field.along @ gap) for gap in gaps)
     feet = skin.feet
     partner = means(own.faces[feet.faces[rows]], feet.weights[rows], len(own.vertices))
-    most = np.stack([((partner @ one) * on_template).sum(axis=1) for one in motion])
+    most = (means_of_motion(partner, motion) * on_template).sum(axis=2)
     of_lid = smooth_step(np.maximum(field.upper, field.lower) / _OF_LID) * feet.found[rows]
     closing, opening = (smooth_step((change - _FROM) / (_TO - _FROM)) @ field.along.T
                         for change in (1.0 - left, left - 1.0))
