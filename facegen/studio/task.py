@@ -79,9 +79,9 @@ class Task:
             self._page.fault(error)
         finally:
             parts = self._bar, self._text, self._button
-            for part in parts:
-                part.visible = False
             with self._page.lock:
+                for part in () if self._page.closed else parts:
+                    part.visible = False
                 self._ended()
             later = threading.Timer(_LINGERS, lambda: [part.remove() for part in parts])
             later.daemon = True
