@@ -11,7 +11,8 @@ displacement u, minimise
 r: the template's displacement (without its jaw); s(t), and r_v: of the partner on the template. Q_t turns the partner's
 plane into the triangle's, so that derivatives are taken along corresponding directions; M and R are the parts'
 (part_motion). The anchor draws every vertex to its partner's own movement, scaled to its part (a screened Poisson
-equation): gradients alone leave shapes adrift. f fades where the partner is far or looks another way; so does area_t.
+equation): gradients alone leave shapes adrift. f fades where the partner is far, f and the triangle's say where it
+looks another way.
 
 The left-hand side is the same for all shapes and all three axes: it is factored once. The right-hand side is linear in
 r: one sparse matrix of blocks (3, 3) makes those of all shapes.

@@ -83,6 +83,13 @@ def studio_server(serve) -> StudioServer:
     return serve()
 
 
+def wait_for_jobs() -> None:
+    """Let jobs of the studio end: what one tells a page that is gone is a warning, which fails a test."""
+    for thread in threading.enumerate():
+        if thread.name.startswith("facegen studio: "):
+            thread.join(5.0)
+
+
 @pytest.fixture
 def raw():
     """A function that opens a websocket of viser's protocol: ``raw(server, work, **options)``; see RawPage."""
@@ -95,9 +102,7 @@ def raw():
         return opened[-1]
 
     yield start
-    for thread in threading.enumerate():            # a job that ends now still tells its page
-        if thread.name.startswith("facegen studio: "):
-            thread.join(5.0)
+    wait_for_jobs()
     for page in opened:
         page.close()
 
@@ -180,6 +185,7 @@ def studio(viser, tmp_path, thumbnails):
         return made
 
     yield start
+    wait_for_jobs()
     for one in running:
         one.stop()
 
