@@ -123,8 +123,8 @@ class Transfer:
         lining, lined = _lining(surface, held, sides)
         near = 1 / (1 + (np.where(feet.found, feet.distances, 0) / _FADE) ** 2)
         anchor = weights.anchor * surface.vertex_areas
-        by_partner, by_lining = anchor * held * near, anchor * (1 - held)
-        anchor = by_partner + by_lining * (_STAY + (1 - _STAY) * lined)
+        by_partner, by_lining = anchor * held * near, anchor * (1 - held) * (_STAY + (1 - _STAY) * lined)
+        anchor = by_partner + by_lining
         matrix = weights.gradients * dirichlet(surface, _ALONE + (1 - _ALONE) * shared) + sparse.diags_array(anchor)
         if weights.identity:
             matrix = matrix + weights.identity * surface.stretching
@@ -138,7 +138,7 @@ class Transfer:
         _check_tied(energy > least)
         self._matrix = matrix + sparse.diags_array(_TIE * energy + least)
         parts = [_gradient_blocks(surface, template, triangle_feet, turns, weights.gradients * shared)]
-        pulled = sparse.diags_array(by_partner) + sparse.diags_array(by_lining * (_STAY + (1 - _STAY) * lined)) @ lining
+        pulled = sparse.diags_array(by_partner) + sparse.diags_array(by_lining) @ lining
         parts.append(Followers(template.faces[feet.faces], feet.weights, matrices).blocks(pulled))
         if weights.landmarks:
             parts.append(landmark_motion.blocks(weights.landmarks * landmarks.T))
